@@ -1,0 +1,27 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+from glob import glob
+
+from setuptools import find_packages, setup
+
+package = 'damadics_bringup'
+
+setup(
+    name=package,
+    version='0.1.0',
+    packages=find_packages(exclude=['test']),
+    data_files=[
+        ('share/ament_index/resource_index/packages', ['resource/' + package]),
+        ('share/' + package, ['package.xml']),
+        ('share/' + package + '/launch', glob('launch/*.py')),
+        ('share/' + package + '/config', glob('config/*.yaml')),
+    ],
+    install_requires=['setuptools'],
+    zip_safe=False,
+    maintainer='DAMADICS FD maintainers',
+    maintainer_email='maintainers@damadics-fd.example',
+    description='Launch files, parameter files, layouts and the demonstration of DAMADICS FD.',
+    license='Apache-2.0',
+    extras_require={'test': ['pytest']},
+    entry_points={'console_scripts': ['demo = damadics_bringup.demo:main']},
+)

@@ -1,0 +1,29 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+from setuptools import find_packages, setup
+
+package = 'damadics_plant'
+
+setup(
+    name=package,
+    version='0.1.0',
+    packages=find_packages(exclude=['test']),
+    package_data={package: ['py.typed', 'scenarios/*.yaml']},
+    data_files=[
+        ('share/ament_index/resource_index/packages', ['resource/' + package]),
+        ('share/' + package, ['package.xml']),
+    ],
+    install_requires=['setuptools'],
+    zip_safe=False,
+    maintainer='DAMADICS FD maintainers',
+    maintainer_email='maintainers@damadics-fd.example',
+    description='The DAMADICS benchmark actuator with 19 faults: simulator node and command.',
+    license='Apache-2.0',
+    extras_require={'test': ['pytest', 'hypothesis', 'scipy']},
+    entry_points={
+        'console_scripts': [
+            'plant = damadics_plant.plant:main',
+            'simulate = damadics_plant.simulate:main',
+        ],
+    },
+)
