@@ -1,0 +1,35 @@
+# The front door. `make demo` and `make test` do all their own set-up.
+
+SHELL := /bin/bash
+PYTHON ?= python3
+ARGS ?=
+ENV := source ./env.sh
+BUILT := ros2_ws/install/.built
+SOURCES := $(shell find ros2_ws/src -type f -not -name '*.pyc' -not -path '*/__pycache__/*' \
+	-not -path '*/test/*' -not -path '*/.pytest_cache/*')
+
+.PHONY: help demo test build env lint clean
+
+help: ## show what can be made
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 18
+
+demo: $(BUILT) ## the paper's two experiments through the running nodes: table, figures, bags
+	@$(ENV) && ros2 run damadics_bringup demo --out bags/demo $(ARGS)
+
+test: $(BUILT) ## run all tests
+	@$(ENV) && python -m pytest -m 'not slow' $(ARGS)
+
+build: $(BUILT) ## set up .venv and build the ROS 2 workspace
+
+env: ## set up .venv only
+	@$(PYTHON) tools/setup_env.py
+
+$(BUILT): $(SOURCES) tools/build.sh tools/setup_env.py $(wildcard tools/requirements/*.txt)
+	@$(PYTHON) tools/setup_env.py
+	@tools/build.sh
+
+lint: $(BUILT) ## check style and types
+	@$(ENV) && ruff check . && mypy ros2_ws/src/damadics_fd/damadics_fd/core
+
+clean: ## remove everything that was built
+	rm -rf .venv ros2_ws/build ros2_ws/install ros2_ws/log

@@ -1,0 +1,24 @@
+#!/bin/bash
+# Build the workspace with the Python of .venv, so that its executables start with that Python.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+root=$PWD
+if [ -z "${ROS_DISTRO:-}" ] && [ -f /opt/ros/jazzy/setup.bash ]; then
+  set +u; . /opt/ros/jazzy/setup.bash; set -u
+fi
+python=$root/.venv/bin/python
+export PATH="$root/.venv/bin:$PATH"
+if [ -d .venv/share/ament_index ]; then
+  export AMENT_PREFIX_PATH="$root/.venv" CMAKE_PREFIX_PATH="$root/.venv"
+fi
+mkdir -p ros2_ws/log
+log=ros2_ws/log/build.txt
+echo 'Building the workspace ...'
+if ! (cd ros2_ws && "$python" -m colcon --log-base log build --event-handlers console_cohesion+ \
+  --cmake-args -GNinja -DBUILD_TESTING=OFF "-DPython3_EXECUTABLE=$python" \
+  "-DPYTHON_EXECUTABLE=$python") >"$log" 2>&1; then
+  tail -n 60 "$log" >&2
+  echo "The build failed; the whole output is in $log." >&2
+  exit 1
+fi
+touch ros2_ws/install/.built
