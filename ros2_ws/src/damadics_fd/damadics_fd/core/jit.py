@@ -3,7 +3,7 @@
 """The one place that decides how a hot loop is compiled."""
 
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 from numba import njit
 
@@ -17,5 +17,4 @@ def jit(function: F) -> F:
     :param function: a function of scalars and arrays; its state is a structured array.
     :return: the compiled function. With `NUMBA_DISABLE_JIT=1` the same source runs uncompiled.
     """
-    compiled: F = njit(cache=True, fastmath=False, error_model='numpy')(function)
-    return compiled
+    return cast(F, njit(cache=True, fastmath=False, error_model='numpy')(function))

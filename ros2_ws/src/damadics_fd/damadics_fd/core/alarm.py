@@ -1,0 +1,204 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Life of an alarm: delays, latch, acknowledge, reset, shelve, near misses, chatter."""
+
+from typing import Any
+
+from damadics_fd.core.jit import jit
+from damadics_fd.core.modes import PHASE_HOLD
+
+# transitions, numbered as in damadics_msgs/FaultEvent
+TRANSITIONS = ('raised', 'cleared', 'acknowledged', 'reset', 'shelved', 'unshelved', 'near_miss',
+               'changed')
+RAISED, CLEARED, ACKNOWLEDGED, RESET, SHELVED, UNSHELVED, NEAR_MISS, CHANGED = range(8)
+
+# states and NAMUR NE 107 levels, numbered as in damadics_msgs/FaultFlag
+STATES = ('not_monitoring', 'learning', 'healthy', 'alarm', 'latched', 'shelved')
+(STATE_NOT_MONITORING, STATE_LEARNING, STATE_HEALTHY, STATE_ALARM, STATE_LATCHED,
+ STATE_SHELVED) = range(6)
+NORMAL, MAINTENANCE_REQUIRED, OUT_OF_SPECIFICATION, FUNCTION_CHECK, FAILURE = range(5)
+NE107 = ('normal', 'maintenance required', 'out of specification', 'function check', 'failure')
+
+RECENT = 16  # alarms remembered for the chatter count
+MINUTE = 60_000_000_000
+STATE = [
+    ('stamp', 'i8'), ('active', '?'), ('latched', '?'), ('acknowledged', '?'), ('flag', '?'),
+    ('worst', 'i8'), ('occurrence', 'i8'), ('since', 'i8'), ('onset', 'i8'), ('peak', 'f8'),
+    ('pending', 'i8'), ('last_decision', 'i8'), ('excursion', 'i8'), ('excursion_peak', 'f8'),
+    ('near_misses', 'i8'), ('chatter', '?'), ('recent', 'i8', (RECENT,)), ('shelved_until', 'i8'),
+]
+NEVER = -1
+
+
+def begin(a: Any) -> None:
+    """
+    Set an alarm record to "nothing has happened".
+
+    :param a: alarm record of zeros.
+    """
+    a.stamp = NEVER
+    a.pending = NEVER
+    a.excursion = NEVER
+    a.recent[:] = NEVER
+
+
+@jit
+def severity(level: int) -> int:
+    """
+    Map the decision's level to NAMUR NE 107.
+
+    :param level: 0..3 as `decision.vote` returns it.
+    :return: NORMAL, MAINTENANCE_REQUIRED, OUT_OF_SPECIFICATION or FAILURE.
+    """
+    return FAILURE if level == 3 else level
+
+
+@jit
+def raise_alarm(a: Any, c: Any, stamp: int, level: int) -> None:
+    """
+    Make the alarm active as a new occurrence.
+
+    :param a: alarm record.
+    :param c: settings record.
+    :param stamp: stamp [ns].
+    :param level: 1..3.
+    """
+    a.active = True
+    a.latched = True
+    a.acknowledged = False
+    a.occurrence += 1
+    a.worst = level
+    a.onset = a.excursion
+    a.peak = a.excursion_peak
+    slot = a.occurrence % min(c.chatter, RECENT)
+    a.chatter = a.recent[slot] >= 0 and stamp - a.recent[slot] <= MINUTE
+    a.recent[slot] = stamp
+
+
+@jit
+def judge(a: Any, c: Any, stamp: int, exceed: bool, level: int, ratio: float) -> int:
+    """
+    Take one decision of an armed detector.
+
+    :param a: alarm record.
+    :param c: settings record.
+    :param stamp: stamp [ns].
+    :param exceed: the residual is over the threshold.
+    :param level: 0..3 as `decision.vote` returns it.
+    :param ratio: residual / threshold.
+    :return: transitions as a set of bits.
+    """
+    events = 0
+    if exceed:
+        if a.excursion < 0:
+            a.excursion = stamp
+            a.excursion_peak = 0.0
+        a.excursion_peak = max(a.excursion_peak, ratio)
+    if level > 0:
+        a.last_decision = stamp
+        if a.pending < 0:
+            a.pending = stamp
+        if not a.active and stamp - a.pending >= c.on_delay * 1e9:
+            raise_alarm(a, c, stamp, level)
+            events |= 1 << RAISED
+    else:
+        a.pending = NEVER
+    if a.active:
+        a.peak = max(a.peak, ratio) if exceed else a.peak
+        if level > a.worst:
+            a.worst = level
+            events |= 1 << CHANGED
+        if level == 0 and stamp - a.last_decision >= c.off_delay * 1e9:
+            a.active = False
+            a.excursion = NEVER
+            a.latched = c.latch
+            events |= 1 << CLEARED
+    elif a.excursion >= 0 and not exceed and level == 0:
+        a.excursion = NEVER
+        a.near_misses += 1
+        events |= 1 << NEAR_MISS
+    return events
+
+
+@jit
+def step(a: Any, c: Any, stamp: int, armed: bool, exceed: bool, level: int, ratio: float) -> int:
+    """
+    Take one decision.
+
+    :param a: alarm record.
+    :param c: settings record.
+    :param stamp: stamp [ns].
+    :param armed: decisions count.
+    :param exceed: the residual is over the threshold.
+    :param level: 0..3 as `decision.vote` returns it.
+    :param ratio: residual / threshold.
+    :return: transitions as a set of bits.
+    """
+    events = 0
+    if stamp < a.stamp:  # the clock was set back: the alarm stays, its timers start afresh
+        a.last_decision = stamp
+        a.pending = NEVER
+        a.excursion = stamp if a.excursion >= 0 and a.active else NEVER
+        a.recent[:] = NEVER
+        if a.shelved_until > 0:
+            a.shelved_until = stamp + max(a.shelved_until - a.stamp, 0)
+    a.stamp = stamp
+    if a.shelved_until > 0 and stamp >= a.shelved_until:
+        a.shelved_until = 0
+        events |= 1 << UNSHELVED
+    if armed:
+        events |= judge(a, c, stamp, exceed, level, ratio)
+    else:
+        a.pending = NEVER
+        if not a.active:
+            a.excursion = NEVER
+    refresh(a)
+    return events
+
+
+@jit
+def refresh(a: Any) -> None:
+    """
+    Set the flag from the state, and the stamp of its last change.
+
+    :param a: alarm record.
+    """
+    flag = (a.active or a.latched) and a.shelved_until == 0
+    if flag != a.flag:
+        a.flag = flag
+        a.since = max(a.stamp, 0)
+
+
+@jit
+def state_of(a: Any, armed: bool, phase: int) -> int:
+    """
+    Return the state that is shown.
+
+    :param a: alarm record.
+    :param armed: decisions count.
+    :param phase: phase of the estimator.
+    :return: a STATE constant of damadics_msgs/FaultFlag.
+    """
+    if a.shelved_until > 0:
+        return STATE_SHELVED
+    if a.active:
+        return STATE_ALARM
+    if a.latched:
+        return STATE_LATCHED
+    if armed:
+        return STATE_HEALTHY
+    return STATE_NOT_MONITORING if phase == PHASE_HOLD else STATE_LEARNING
+
+
+@jit
+def level_of(a: Any, armed: bool) -> int:
+    """
+    Return the NAMUR NE 107 level that is shown.
+
+    :param a: alarm record.
+    :param armed: decisions count.
+    :return: a level; function check while shelved, learning or not monitoring.
+    """
+    if a.flag:
+        return severity(a.worst)
+    return FUNCTION_CHECK if a.shelved_until > 0 or not armed else NORMAL

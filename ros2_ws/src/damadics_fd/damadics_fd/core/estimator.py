@@ -1,0 +1,331 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""The estimator: one measurement in, one estimate out."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from damadics_fd.core import approximator, force, quality, velocity
+from damadics_fd.core.jit import jit
+from damadics_fd.core.modes import (
+    MONITOR,
+    PAPER,
+    PHASE_HOLD,
+    PHASE_INIT,
+    PHASE_LEARN_ALPHA,
+    PHASE_LEARN_PHI,
+    PHASE_MONITOR,
+    PHASE_PAPER,
+    PHASES,
+)
+from damadics_fd.core.settings import Settings
+
+SUBSTEPS = 1000  # at most, in one gap
+ESTIMATE = np.dtype((np.record, np.dtype([
+    ('stamp', 'i8'), ('x2', 'f8'), ('x1_hat', 'f8'), ('x2_hat', 'f8'), ('xi1', 'f8'),
+    ('xi2', 'f8'), ('phi', 'f8'), ('alpha1', 'f8'), ('alpha4', 'f8'), ('alpha5', 'f8'),
+    ('x1', 'f8'), ('u', 'f8'), ('ps', 'f8'), ('dp', 'f8'), ('progress', 'f8'), ('phase', 'i8'),
+])))
+STATE = np.dtype((np.record, np.dtype([
+    ('elapsed', 'i8'),  # ns of monitored time since the first sample, gaps of restarts left out
+    ('held_until', 'i8'),  # elapsed time at which the filters have settled after a restart
+    ('armed', '?'), ('travel', 'f8'),
+    *velocity.STATE, *approximator.STATE,
+], align=True)))
+
+
+class Estimate(NamedTuple):
+    """Hold one result of the estimator, with the fields of damadics_msgs/Estimate."""
+
+    stamp: int  # ns
+    x2: float
+    x1_hat: float
+    x2_hat: float
+    xi1: float
+    xi2: float
+    phi: float
+    alpha1: float
+    alpha4: float
+    alpha5: float
+    x1: float
+    u: float
+    ps: float
+    dp: float
+    progress: float
+    phase: int
+
+    @property
+    def alpha_hat(self) -> tuple[float, float, float]:
+        """
+        Return the estimates of alpha1, alpha4, alpha5.
+
+        :return: [1/s, 1/s2, 1/s2].
+        """
+        return self.alpha1, self.alpha4, self.alpha5
+
+
+def begin(s: Any, c: Any) -> None:
+    """
+    Set a state record to "nothing learned".
+
+    :param s: state record of zeros.
+    :param c: settings record.
+    """
+    s.ah1 = c.alpha1
+    s.ah4 = c.alpha4
+    s.ah5 = c.alpha5
+
+
+@jit
+def phase_of(s: Any, c: Any) -> int:
+    """
+    Return the phase for the time spent and the travel seen.
+
+    :param s: state record.
+    :param c: settings record.
+    :return: a PHASE constant.
+    """
+    if c.mode == PAPER:
+        return PHASE_PAPER
+    if s.elapsed < s.held_until:
+        return PHASE_HOLD
+    if s.armed:
+        return PHASE_MONITOR
+    t = s.elapsed * 1e-9
+    if t < c.t_on:
+        return PHASE_INIT
+    if t < c.t_w:
+        return PHASE_LEARN_ALPHA
+    if t < c.t_learn or s.travel < c.travel_min:
+        return PHASE_LEARN_PHI
+    s.armed = True
+    return PHASE_MONITOR
+
+
+@jit
+def progress_of(s: Any, c: Any) -> float:
+    """
+    Return the share of the learning that is done.
+
+    :param s: state record.
+    :param c: settings record.
+    :return: 0..1.
+    """
+    if c.mode == PAPER or s.armed:
+        return 1.0
+    wait = c.t_w / c.t_learn if c.t_learn > 0.0 else 0.0
+    done = min(1.0, s.elapsed * 1e-9 / c.t_learn) if c.t_learn > 0.0 else 1.0
+    moved = min(1.0, s.travel / c.travel_min) if c.travel_min > 0.0 else 1.0
+    return min(done, wait + (1.0 - wait) * moved)
+
+
+@jit
+def advance(s: Any, c: Any, phase: int, dt: float, x1: float, x2: float, u: float) -> None:
+    """
+    Advance observer and, where the phase allows it, adaptation by one step.
+
+    :param s: state record.
+    :param c: settings record.
+    :param phase: phase of the estimator.
+    :param dt: time step [s].
+    :param x1: position, filtered [1].
+    :param x2: velocity [1/s].
+    :param u: input, filtered [1].
+    """
+    approximator.observe(s, c, dt, x1, x2, u)
+    if phase == PHASE_PAPER:
+        approximator.adapt_alpha(s, c, dt, x1, u)
+        approximator.adapt_phi(s, c, dt, x2)
+    elif phase in (PHASE_LEARN_ALPHA, PHASE_LEARN_PHI):
+        x = x1 - c.preload
+        if x < c.gate_low or x > 1.0 - c.gate_high:
+            return
+        approximator.adapt_alpha(s, c, dt, x1, u)
+        if phase == PHASE_LEARN_PHI:
+            approximator.adapt_phi(s, c, dt, x2)
+            if abs(x2) > c.travel_speed:
+                s.travel += abs(x2) * dt
+
+
+@jit
+def step(q: Any, s: Any, c: Any, e: Any, stamp: int, cv: float, x1: float, p1: float, p2: float,
+         t1: float, flow: float, ps: float) -> int:
+    """
+    Take one sample.
+
+    :param q: quality record.
+    :param s: state record; untouched where the sample is refused.
+    :param c: settings record.
+    :param e: estimate record, written where the sample is accepted.
+    :param stamp: stamp [ns].
+    :param cv: control value [1].
+    :param x1: stem position [1].
+    :param p1: pressure before the valve [Pa].
+    :param p2: pressure behind the valve [Pa].
+    :param t1: temperature of the medium [degC].
+    :param flow: flow [kg/s].
+    :param ps: chamber pressure, gauge [Pa].
+    :return: quality.ACCEPTED or the reason of refusal.
+    """
+    reason = quality.check_values(c, cv, x1, p1, p2, t1, flow, ps)
+    if reason == quality.ACCEPTED:
+        reason = quality.check_stamp(q, c, stamp)
+    first = q.counts[quality.ACCEPTED] == 0
+    dt = quality.admit(q, c, stamp, reason)
+    if reason != quality.ACCEPTED:
+        return reason
+
+    y = x1 + c.preload
+    afresh = dt < 0.0
+    if afresh:
+        dt = -dt
+        velocity.restart(s, y)
+        approximator.restart(s, y)
+        s.held_until = 0 if first else s.elapsed + int(c.hold * 1e9)
+    else:
+        s.elapsed += int(dt * 1e9 + 0.5)
+    x1_before, x2_before, u_before = s.x1, s.x2, s.u
+    smooth = velocity.filter_position(s, c, dt, y)
+    u = cv
+    if c.mode == MONITOR:
+        u = force.force_input(c, smooth - c.preload, p1, p2, ps)
+    if afresh:
+        velocity.restart_input(s, u)
+    velocity.filter_input(s, c, dt, u)
+
+    phase = phase_of(s, c)
+    parts = 1 if afresh else min(int(dt * c.sample_rate / 1.5) + 1, SUBSTEPS)
+    if parts == 1:
+        advance(s, c, phase, dt, s.x1, s.x2, s.u)
+    else:  # a gap: bridge it on straight lines between the filtered signals
+        for i in range(1, parts + 1):
+            part = i / parts
+            advance(s, c, phase, dt / parts, x1_before + part * (s.x1 - x1_before),
+                    x2_before + part * (s.x2 - x2_before), u_before + part * (s.u - u_before))
+
+    e.stamp = stamp
+    e.x2 = s.x2
+    e.x1_hat = s.xh1
+    e.x2_hat = s.xh2
+    e.xi1 = s.xi1
+    e.xi2 = s.xi2
+    e.phi = s.phi
+    e.alpha1 = s.ah1
+    e.alpha4 = s.ah4
+    e.alpha5 = s.ah5
+    e.x1 = x1
+    e.u = u
+    e.ps = ps
+    e.dp = p1 - p2
+    e.progress = progress_of(s, c)
+    e.phase = phase
+    return reason
+
+
+@jit
+def update(q: NDArray, s: NDArray, c: NDArray, e: NDArray, stamp: int, cv: float, x1: float,
+           p1: float, p2: float, t1: float, flow: float, ps: float) -> int:
+    """
+    Take one sample; `step` for arrays of length 1, to be called from Python.
+
+    :param q: quality state.
+    :param s: estimator state.
+    :param c: settings.
+    :param e: estimate.
+    :param stamp: stamp [ns].
+    :param cv: control value [1].
+    :param x1: stem position [1].
+    :param p1: pressure before the valve [Pa].
+    :param p2: pressure behind the valve [Pa].
+    :param t1: temperature of the medium [degC].
+    :param flow: flow [kg/s].
+    :param ps: chamber pressure, gauge [Pa].
+    :return: quality.ACCEPTED or the reason of refusal.
+    """
+    return step(q[0], s[0], c[0], e[0], stamp, cv, x1, p1, p2, t1, flow, ps)
+
+
+class Estimator:
+    """
+    Estimate velocity, residual and learned bound from one measurement after the other.
+
+    :param settings: all settings; `settings.mode` chooses paper or monitor mode.
+
+    >>> import math
+    >>> estimator = Estimator(Settings.for_mode('paper'))
+    >>> estimator.update(0, 1.0, 0.0, 3.5e6, 2.6e6, 20.0, 12.0, math.nan).phase == PHASE_PAPER
+    True
+    >>> estimator.update(2_500_000, 1.0, math.nan, 3.5e6, 2.6e6, 20.0, 12.0, math.nan)
+    >>> estimator.last_rejection
+    'not_finite: x1 = nan'
+    """
+
+    def __init__(self, settings: Settings) -> None:
+        self.settings = settings
+        self.quality = np.zeros(1, quality.DTYPE)
+        self.state = np.zeros(1, STATE)
+        self.last_rejection = ''
+        self._settings = settings.record()
+        self._estimate = np.zeros(1, ESTIMATE)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything: what was learned, the filters and the counters."""
+        self.quality[:] = np.zeros(1, quality.DTYPE)
+        self.state[:] = np.zeros(1, STATE)
+        self.last_rejection = ''
+        begin(self.state[0], self._settings[0])
+
+    def update(self, stamp: int, cv: float, x1: float, p1: float, p2: float, t1: float,
+               flow: float, ps: float) -> Estimate | None:
+        """
+        Take one measurement, with the fields of damadics_msgs/Measurement.
+
+        :param stamp: sampling instant [ns].
+        :param cv: control value [1].
+        :param x1: stem position [1], 0 open, 1 closed.
+        :param p1: pressure before the valve [Pa].
+        :param p2: pressure behind the valve [Pa].
+        :param t1: temperature of the medium [degC].
+        :param flow: flow [kg/s].
+        :param ps: chamber pressure, gauge [Pa]; NaN where not measured.
+        :return: the estimate; None where the sample was refused, see `last_rejection`.
+        """
+        reason = update(self.quality, self.state, self._settings, self._estimate, stamp, cv, x1,
+                        p1, p2, t1, flow, ps)
+        if reason:
+            self.last_rejection = self._explain(reason, stamp, (cv, x1, p1, p2, t1, flow, ps))
+            return None
+        return Estimate._make(self._estimate.item())
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """
+        Return how many samples were accepted and refused for which reason, and interruptions.
+
+        :return: counts by name.
+        """
+        q = self.quality[0]
+        counts = {name: int(n) for name, n in zip(quality.REASONS, q.counts, strict=True)}
+        for name in ('gaps', 'missed', 'restarts', 'clock_jumps', 'refused_in_a_row'):
+            counts[name] = int(q[name])
+        return counts
+
+    @property
+    def phase(self) -> str:
+        """
+        Return the phase of the last estimate.
+
+        :return: a name out of `modes.PHASES`.
+        """
+        return PHASES[int(self._estimate[0].phase)]
+
+    def _explain(self, reason: int, stamp: int, values: tuple[float, ...]) -> str:
+        name = quality.REASONS[reason]
+        if reason in (quality.NOT_FINITE, quality.OUT_OF_RANGE):
+            for index, value in enumerate(values):
+                if quality.judge_signal(self._settings, index, value) == reason:
+                    return f'{name}: {quality.SIGNALS[index]} = {value:g}'
+        return f'{name}: {stamp} ns after {int(self.quality[0].stamp)} ns'

@@ -1,0 +1,152 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""A recording through estimator and detector in one compiled loop."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from damadics_fd.core import detector as detecting
+from damadics_fd.core import estimator as estimating
+from damadics_fd.core.alarm import RAISED
+from damadics_fd.core.detector import DECISION, Detector
+from damadics_fd.core.estimator import ESTIMATE, Estimator
+from damadics_fd.core.events import Event, events_of
+from damadics_fd.core.jit import jit
+from damadics_fd.core.quality import SIGNALS
+from damadics_fd.core.settings import Settings
+
+
+@dataclass(frozen=True)
+class Result:
+    """
+    Hold what estimator and detector made of a recording.
+
+    Row n belongs to sample n; rows of refused samples hold NaN and the state before.
+    """
+
+    reason: NDArray[np.uint8]  # 0 accepted, else index into quality.REASONS
+    estimates: NDArray[Any]  # structured, fields of Estimate
+    decisions: NDArray[Any]  # structured, fields of Decision
+    estimator: Estimator  # with the state after the last sample
+    detector: Detector
+
+    @property
+    def accepted(self) -> NDArray[np.bool_]:
+        """
+        Tell which samples were accepted.
+
+        :return: mask.
+        """
+        mask: NDArray[np.bool_] = self.reason == 0
+        return mask
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """
+        Return the counters of the estimator.
+
+        :return: counts by name.
+        """
+        return self.estimator.counters
+
+    @property
+    def events(self) -> list[Event]:
+        """
+        List all transitions of the alarm.
+
+        :return: events in order of time.
+        """
+        rows = np.flatnonzero(self.decisions['transitions'])
+        return [event for row in rows for event in events_of(self.decisions[row])]
+
+    @property
+    def detections(self) -> list[Event]:
+        """
+        List the alarms; in paper mode each rising edge of the two-sample decision.
+
+        :return: the events `raised`.
+        """
+        return [event for event in self.events if event.transition == RAISED]
+
+
+@jit
+def loop(q: NDArray, s: NDArray, ds: NDArray, c: NDArray, stamp: NDArray, cv: NDArray,
+         x1: NDArray, p1: NDArray, p2: NDArray, t1: NDArray, flow: NDArray, ps: NDArray,
+         reason: NDArray, estimates: NDArray, decisions: NDArray) -> None:
+    """
+    Run `estimator.step` and `detector.step` over columns.
+
+    :param q: quality state.
+    :param s: estimator state.
+    :param ds: detector state.
+    :param c: settings.
+    :param stamp: stamps [ns].
+    :param cv: control values.
+    :param x1: positions.
+    :param p1: pressures before the valve.
+    :param p2: pressures behind the valve.
+    :param t1: temperatures.
+    :param flow: flows.
+    :param ps: chamber pressures.
+    :param reason: written: 0 or the reason of refusal.
+    :param estimates: written.
+    :param decisions: written; rows of refused samples stay as they are.
+    """
+    for i in range(len(stamp)):
+        reason[i] = estimating.step(q[0], s[0], c[0], estimates[i], stamp[i], cv[i], x1[i], p1[i],
+                                    p2[i], t1[i], flow[i], ps[i])
+        if reason[i] == 0:
+            detecting.step(ds[0], c[0], estimates[i], decisions[i])
+
+
+def run(columns: Mapping[str, NDArray[Any]], settings: Settings,
+        estimator: Estimator | None = None, detector: Detector | None = None) -> Result:
+    """
+    Run a recording through estimator and detector, bit for bit as sample by sample.
+
+    :param columns: `stamp` (int64, ns), `cv`, `x1`, and `p1`, `p2`, `t1`, `flow`, `ps` where
+        they are measured; 1-D arrays of one length.
+    :param settings: all settings.
+    :param estimator: continue with this one instead of a new one (chunks, a loaded reference).
+    :param detector: continue with this one instead of a new one.
+    :return: estimates, decisions, counters, events.
+    :raises KeyError: where `stamp`, `cv` or `x1` is absent.
+    :raises ValueError: where the columns differ in length.
+    """
+    estimator = estimator or Estimator(settings)
+    detector = detector or Detector(settings)
+    missing = [name for name in ('stamp', 'cv', 'x1') if name not in columns]
+    if missing:
+        raise KeyError(f'the recording has no column {", ".join(missing)}')
+    stamp = np.ascontiguousarray(columns['stamp'], np.int64)
+    unmeasured = np.broadcast_to(np.array(np.nan), stamp.shape)
+    signals = [np.ascontiguousarray(columns.get(name, unmeasured), np.float64)
+               for name in SIGNALS]
+    if any(signal.shape != stamp.shape for signal in signals):
+        raise ValueError('the columns of the recording differ in length')
+    reason = np.zeros(len(stamp), np.uint8)
+    estimates = np.zeros(len(stamp), ESTIMATE)
+    decisions = np.zeros(len(stamp), DECISION)
+    cv, x1, p1, p2, t1, flow, ps = signals
+    loop(estimator.quality, estimator.state, detector.state, settings.record(), stamp, cv, x1,
+         p1, p2, t1, flow, ps, reason, estimates, decisions)
+    _blank(reason, stamp, estimates, decisions)
+    return Result(reason, estimates, decisions, estimator, detector)
+
+
+def _blank(reason: NDArray[np.uint8], stamp: NDArray[np.int64], estimates: NDArray[Any],
+           decisions: NDArray[Any]) -> None:
+    refused = np.flatnonzero(reason)
+    for rows in (estimates, decisions):
+        for name in rows.dtype.names or ():
+            if rows.dtype[name].kind == 'f':
+                rows[name][refused] = np.nan
+        rows['stamp'][refused] = stamp[refused]
+    hold = np.maximum.accumulate(np.where(reason == 0, np.arange(len(reason)), -1))[refused]
+    seen = hold >= 0
+    for name in ('fault', 'state', 'level', 'since', 'onset', 'occurrence'):
+        decisions[name][refused[seen]] = decisions[name][hold[seen]]

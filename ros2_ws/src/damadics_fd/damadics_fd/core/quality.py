@@ -1,0 +1,178 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Check of one sample before it may touch any filter state."""
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from damadics_fd.core.jit import jit
+from damadics_fd.core.modes import MONITOR
+
+REASONS = ('accepted', 'not_finite', 'out_of_range', 'zero_stamp', 'duplicate', 'out_of_order')
+ACCEPTED, NOT_FINITE, OUT_OF_RANGE, ZERO_STAMP, DUPLICATE, OUT_OF_ORDER = range(len(REASONS))
+EXPLANATIONS = {
+    'not_finite': 'a needed signal is missing, NaN or infinite',
+    'out_of_range': 'a signal is outside its range: sensor failure or wrong unit',
+    'zero_stamp': 'header.stamp is 0: the driver does not stamp its samples',
+    'duplicate': 'header.stamp equals that of the sample before',
+    'out_of_order': 'header.stamp is before that of the sample before',
+}
+SIGNALS = ('cv', 'x1', 'p1', 'p2', 't1', 'flow', 'ps')
+
+DTYPE = np.dtype((np.record, np.dtype([
+    ('stamp', 'i8'),  # of the last accepted sample
+    ('started', '?'),
+    ('counts', 'i8', (len(REASONS),)),
+    ('gaps', 'i8'), ('missed', 'i8'),  # gaps that were bridged, samples missing in them
+    ('restarts', 'i8'), ('clock_jumps', 'i8'),
+    ('refused_in_a_row', 'i8'),
+    ('jump_stamp', 'i8'), ('jump_count', 'i8'),  # samples in order after a clock set back
+], align=True)))
+
+
+@jit
+def value_fault(value: float, low: float, high: float, needed: bool) -> int:
+    """
+    Judge one signal.
+
+    :param value: the signal; NaN is "not measured".
+    :param low: lower end of its range.
+    :param high: upper end of its range.
+    :param needed: refuse NaN as well.
+    :return: ACCEPTED, NOT_FINITE or OUT_OF_RANGE.
+    """
+    if math.isnan(value):
+        return NOT_FINITE if needed else ACCEPTED
+    if math.isinf(value):
+        return NOT_FINITE
+    return ACCEPTED if low <= value <= high else OUT_OF_RANGE
+
+
+@jit
+def signal_fault(c: Any, index: int, value: float) -> int:
+    """
+    Judge one signal by its place in SIGNALS.
+
+    Paper mode needs cv and x1, monitor mode also p1, p2, ps; t1 and flow are used by neither,
+    so only an infinite value, the mark of a corrupt sample, is refused there.
+
+    :param c: settings record.
+    :param index: place in SIGNALS.
+    :param value: the signal.
+    :return: ACCEPTED, NOT_FINITE or OUT_OF_RANGE.
+    """
+    force = c.mode == MONITOR
+    if index <= 1:
+        return value_fault(value, c.signal_low, c.signal_high, True)
+    if index <= 3:
+        return value_fault(value, -0.025 * c.p_max, c.p_max, force)
+    if index == 6:
+        return value_fault(value, -0.025 * c.ps_max, c.ps_max, force)
+    return NOT_FINITE if math.isinf(value) else ACCEPTED
+
+
+@jit
+def judge_signal(c: NDArray, index: int, value: float) -> int:
+    """
+    Judge one signal; `signal_fault` for an array of length 1, to be called from Python.
+
+    :param c: settings.
+    :param index: place in SIGNALS.
+    :param value: the signal.
+    :return: ACCEPTED, NOT_FINITE or OUT_OF_RANGE.
+    """
+    return signal_fault(c[0], index, value)
+
+
+@jit
+def check_values(c: Any, cv: float, x1: float, p1: float, p2: float, t1: float, flow: float,
+                 ps: float) -> int:
+    """
+    Judge the signals of a sample.
+
+    :param c: settings record.
+    :param cv: control value [1].
+    :param x1: stem position [1].
+    :param p1: pressure before the valve [Pa].
+    :param p2: pressure behind the valve [Pa].
+    :param t1: temperature [degC].
+    :param flow: flow [kg/s].
+    :param ps: chamber pressure [Pa].
+    :return: ACCEPTED or the reason of the first signal to be refused.
+    """
+    for index, value in enumerate((cv, x1, p1, p2, t1, flow, ps)):
+        reason = signal_fault(c, index, value)
+        if reason != ACCEPTED:
+            return reason
+    return ACCEPTED
+
+
+@jit
+def check_stamp(q: Any, c: Any, stamp: int) -> int:
+    """
+    Judge the stamp of a sample with good values.
+
+    A stamp of 0 is good for the very first sample only: scenario zero. Stamps that stay far
+    behind and in order among themselves are a clock set back, not disorder: then the last of
+    them is accepted, with `q.started` off, so that the filters start afresh.
+
+    :param q: quality record.
+    :param c: settings record.
+    :param stamp: stamp [ns].
+    :return: ACCEPTED or the reason of refusal.
+    """
+    if not q.started:
+        if stamp < 0:
+            return OUT_OF_ORDER
+        return ACCEPTED if stamp > 0 or q.counts[ACCEPTED] == 0 else ZERO_STAMP
+    if stamp > q.stamp:
+        q.jump_count = 0
+        return ACCEPTED
+    if stamp == 0:
+        return ZERO_STAMP
+    if stamp == q.stamp:
+        return DUPLICATE
+    if stamp < 0 or q.stamp - stamp < c.clock_jump * 1e9:
+        return OUT_OF_ORDER
+    q.jump_count = q.jump_count + 1 if q.jump_count > 0 and stamp > q.jump_stamp else 1
+    q.jump_stamp = stamp
+    if q.jump_count < c.clock_jump_samples:
+        return OUT_OF_ORDER
+    q.jump_count = 0
+    q.clock_jumps += 1
+    q.started = False
+    return ACCEPTED
+
+
+@jit
+def admit(q: Any, c: Any, stamp: int, reason: int) -> float:
+    """
+    Count a judged sample and return its time step.
+
+    :param q: quality record.
+    :param c: settings record.
+    :param stamp: stamp [ns].
+    :param reason: result of the checks.
+    :return: time since the last accepted sample [s]; 0 for a refused one; the nominal step,
+        negative, where the filters have to start afresh.
+    """
+    q.counts[reason] += 1
+    if reason != ACCEPTED:
+        q.refused_in_a_row += 1
+        return 0.0
+    q.refused_in_a_row = 0
+    dt = -c.dt
+    if q.started:
+        dt = (stamp - q.stamp) * 1e-9
+        if dt > 1.5 * c.dt:
+            q.gaps += 1
+            q.missed += int(dt * c.sample_rate + 0.5) - 1
+        if dt > c.gap_reset:
+            q.restarts += 1
+            dt = -c.dt
+    q.started = True
+    q.stamp = stamp
+    return dt
