@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Life of an alarm: delays, latch, acknowledge, reset, shelve, near misses, chatter."""
 
-from typing import Any
+import math
+from typing import Any, NamedTuple
 
 from damadics_fd.core.jit import jit
 from damadics_fd.core.modes import PHASE_HOLD
@@ -28,6 +29,15 @@ STATE = [
     ('near_misses', 'i8'), ('chatter', '?'), ('recent', 'i8', (RECENT,)), ('shelved_until', 'i8'),
 ]
 NEVER = -1
+LONGEST_SHELF = 30 * 86400.0  # s
+
+
+class Answer(NamedTuple):
+    """Hold what became of a request of an operator."""
+
+    done: bool
+    text: str  # one sentence; the reason where it was refused
+    transitions: int = 0  # bit n: transition n
 
 
 def begin(a: Any) -> None:
@@ -68,15 +78,15 @@ def raise_alarm(a: Any, c: Any, stamp: int, level: int) -> None:
     a.acknowledged = False
     a.occurrence += 1
     a.worst = level
-    a.onset = a.excursion
+    a.onset = a.excursion if a.excursion >= 0 else stamp
     a.peak = a.excursion_peak
-    slot = a.occurrence % min(c.chatter, RECENT)
-    a.chatter = a.recent[slot] >= 0 and stamp - a.recent[slot] <= MINUTE
-    a.recent[slot] = stamp
+    a.recent[a.occurrence % c.chatter] = stamp
+    oldest = a.recent[(a.occurrence + 1) % c.chatter]
+    a.chatter = oldest >= 0 and stamp - oldest <= MINUTE
 
 
 @jit
-def judge(a: Any, c: Any, stamp: int, exceed: bool, level: int, ratio: float) -> int:
+def judge(a: Any, c: Any, stamp: int, exceed: bool, busy: bool, level: int, ratio: float) -> int:
     """
     Take one decision of an armed detector.
 
@@ -84,6 +94,7 @@ def judge(a: Any, c: Any, stamp: int, exceed: bool, level: int, ratio: float) ->
     :param c: settings record.
     :param stamp: stamp [ns].
     :param exceed: the residual is over the threshold.
+    :param busy: it was so in one of the last N samples.
     :param level: 0..3 as `decision.vote` returns it.
     :param ratio: residual / threshold.
     :return: transitions as a set of bits.
@@ -108,12 +119,13 @@ def judge(a: Any, c: Any, stamp: int, exceed: bool, level: int, ratio: float) ->
         if level > a.worst:
             a.worst = level
             events |= 1 << CHANGED
-        if level == 0 and stamp - a.last_decision >= c.off_delay * 1e9:
+        gone = level == 0 and not exceed
+        if gone and stamp - a.last_decision >= c.off_delay * 1e9:
             a.active = False
             a.excursion = NEVER
             a.latched = c.latch
             events |= 1 << CLEARED
-    elif a.excursion >= 0 and not exceed and level == 0:
+    elif a.excursion >= 0 and not busy:
         a.excursion = NEVER
         a.near_misses += 1
         events |= 1 << NEAR_MISS
@@ -121,7 +133,8 @@ def judge(a: Any, c: Any, stamp: int, exceed: bool, level: int, ratio: float) ->
 
 
 @jit
-def step(a: Any, c: Any, stamp: int, armed: bool, exceed: bool, level: int, ratio: float) -> int:
+def step(a: Any, c: Any, stamp: int, armed: bool, exceed: bool, busy: bool, level: int,
+         ratio: float) -> int:
     """
     Take one decision.
 
@@ -130,6 +143,7 @@ def step(a: Any, c: Any, stamp: int, armed: bool, exceed: bool, level: int, rati
     :param stamp: stamp [ns].
     :param armed: decisions count.
     :param exceed: the residual is over the threshold.
+    :param busy: it was so in one of the last N samples.
     :param level: 0..3 as `decision.vote` returns it.
     :param ratio: residual / threshold.
     :return: transitions as a set of bits.
@@ -147,7 +161,7 @@ def step(a: Any, c: Any, stamp: int, armed: bool, exceed: bool, level: int, rati
         a.shelved_until = 0
         events |= 1 << UNSHELVED
     if armed:
-        events |= judge(a, c, stamp, exceed, level, ratio)
+        events |= judge(a, c, stamp, exceed, busy, level, ratio)
     else:
         a.pending = NEVER
         if not a.active:
@@ -202,3 +216,70 @@ def level_of(a: Any, armed: bool) -> int:
     if a.flag:
         return severity(a.worst)
     return FUNCTION_CHECK if a.shelved_until > 0 or not armed else NORMAL
+
+
+def acknowledge(a: Any, occurrence: int | None = None) -> Answer:
+    """
+    Note that a person has seen the alarm.
+
+    :param a: alarm record.
+    :param occurrence: the alarm meant; the present one where it is None.
+    :return: the answer; acknowledging twice is no error and no transition.
+    """
+    if not (a.active or a.latched):
+        return Answer(False, 'there is no alarm to acknowledge')
+    if occurrence is not None and occurrence != a.occurrence:
+        return Answer(False, f'there is no alarm {occurrence}; the present one is {a.occurrence}')
+    if a.acknowledged:
+        return Answer(True, f'alarm {a.occurrence} was acknowledged before')
+    a.acknowledged = True
+    return Answer(True, f'alarm {a.occurrence} acknowledged', 1 << ACKNOWLEDGED)
+
+
+def reset(a: Any) -> Answer:
+    """
+    Release the latch of an alarm whose condition has gone, after repair or inspection.
+
+    :param a: alarm record.
+    :return: the answer; refused while the condition lasts.
+    """
+    if a.active:
+        return Answer(False, f'alarm {a.occurrence} is still active; shelve it for the time of '
+                      'the repair and reset it when its condition has gone')
+    if not a.latched:
+        return Answer(False, 'there is no alarm to reset')
+    seen = 0 if a.acknowledged else 1 << ACKNOWLEDGED
+    a.acknowledged = True
+    a.latched = False
+    refresh(a)
+    return Answer(True, f'alarm {a.occurrence} reset', seen | 1 << RESET)
+
+
+def shelve(a: Any, seconds: float) -> Answer:
+    """
+    Mask the alarm for a time; what happens meanwhile is recorded and shown afterwards.
+
+    :param a: alarm record.
+    :param seconds: how long, counted in stamps of the measurement.
+    :return: the answer; refused for a time that is not positive or longer than 30 days.
+    """
+    if not 0.0 < seconds <= LONGEST_SHELF:
+        return Answer(False, f'cannot shelve for {seconds:g} s: give 0 < seconds <= '
+                      f'{LONGEST_SHELF:.0f}')
+    a.shelved_until = max(a.stamp, 0) + math.ceil(seconds * 1e9)
+    refresh(a)
+    return Answer(True, f'alarms shelved for {seconds:g} s', 1 << SHELVED)
+
+
+def unshelve(a: Any) -> Answer:
+    """
+    End a shelf before its time.
+
+    :param a: alarm record.
+    :return: the answer.
+    """
+    if a.shelved_until == 0:
+        return Answer(False, 'alarms are not shelved')
+    a.shelved_until = 0
+    refresh(a)
+    return Answer(True, 'alarms no longer shelved', 1 << UNSHELVED)

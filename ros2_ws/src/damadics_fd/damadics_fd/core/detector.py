@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The detector: one estimate in, one decision out."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,9 +19,14 @@ LARGE = 1e9  # ratio to a threshold of zero
 DECISION = np.dtype((np.record, np.dtype([
     ('stamp', 'i8'), ('residual', 'f8'), ('threshold', 'f8'), ('ratio', 'f8'), ('exceed', '?'),
     ('fault', '?'), ('state', 'i8'), ('level', 'i8'), ('since', 'i8'), ('onset', 'i8'),
-    ('occurrence', 'i8'), ('peak', 'f8'), ('transitions', 'i8'),
+    ('occurrence', 'i8'), ('acknowledged', '?'), ('peak', 'f8'), ('still', 'f8'),
+    ('transitions', 'i8'),
 ], align=True)))
-STATE = np.dtype((np.record, np.dtype([*decision.STATE, *alarm.STATE], align=True)))
+STATE = np.dtype((np.record, np.dtype([
+    *decision.STATE, *alarm.STATE, ('place', 'f8'), ('moved', 'i8'),
+], align=True)))
+STIR = 0.01  # of the stroke: less is no motion of the stem
+
 
 
 class Decision(NamedTuple):
@@ -38,9 +43,19 @@ class Decision(NamedTuple):
     since: int  # last change of `fault`
     onset: int  # estimated onset of the fault, 0 while there is none
     occurrence: int  # faults flagged since the start
+    acknowledged: bool
     peak: float  # largest ratio of this fault
+    still: float  # time since the stem last moved by 1 % of its stroke [s]
     transitions: int  # bit n: transition n of damadics_msgs/FaultEvent
     events: Sequence[Event] = ()
+
+
+class Outcome(NamedTuple):
+    """Hold what became of a request of an operator."""
+
+    done: bool
+    text: str  # one sentence; the reason where it was refused
+    events: tuple[Event, ...]
 
 
 @jit
@@ -63,19 +78,38 @@ def step(s: Any, c: Any, e: Any, d: Any) -> None:
         level = decision.vote(s, c, exceed, ratio)
     else:
         decision.clear(s)
-    d.transitions = alarm.step(s, c, e.stamp, armed, exceed, level, ratio)
-    d.stamp = e.stamp
+    d.transitions = alarm.step(s, c, e.stamp, armed, exceed, s.count[0] > 0, level,
+                               ratio)
     d.residual = residual
     d.threshold = rho
     d.ratio = ratio
     d.exceed = exceed
+    if s.moved < 0 or e.stamp < s.moved or abs(e.x1 - s.place) > STIR:
+        s.place = e.x1
+        s.moved = e.stamp
+    report(s, e, d)
+
+
+@jit
+def report(s: Any, e: Any, d: Any) -> None:
+    """
+    Copy the state of the alarm into a decision.
+
+    :param s: state record.
+    :param e: estimate record.
+    :param d: decision record, written.
+    """
+    armed = decision.armed(e.phase)
+    d.stamp = e.stamp
     d.state = alarm.state_of(s, armed, e.phase)
     d.level = alarm.level_of(s, armed)
     d.fault = s.flag
     d.since = s.since
     d.onset = s.onset if s.active or s.latched else 0
     d.occurrence = s.occurrence
+    d.acknowledged = s.acknowledged
     d.peak = s.peak
+    d.still = (e.stamp - s.moved) * 1e-9
 
 
 @jit
@@ -89,6 +123,18 @@ def update(s: NDArray, c: NDArray, e: NDArray, d: NDArray) -> None:
     :param d: decision, written.
     """
     step(s[0], c[0], e[0], d[0])
+
+
+@jit
+def show(s: NDArray, e: NDArray, d: NDArray) -> None:
+    """
+    Copy the state of the alarm into a decision; `report` for arrays of length 1.
+
+    :param s: detector state.
+    :param e: the latest estimate.
+    :param d: decision, written.
+    """
+    report(s[0], e[0], d[0])
 
 
 class Detector:
@@ -109,7 +155,9 @@ class Detector:
     def reset(self) -> None:
         """Forget everything, alarms too."""
         self.state[:] = np.zeros(1, STATE)
+        self._decision[:] = np.zeros(1, DECISION)
         alarm.begin(self.state[0])
+        self.state['moved'] = -1
 
     def update(self, estimate: Estimate) -> Decision:
         """
@@ -120,5 +168,98 @@ class Detector:
         """
         self._estimate[0] = estimate
         update(self.state, self._settings, self._estimate, self._decision)
+        return self.decision
+
+    @property
+    def decision(self) -> Decision:
+        """
+        Return the latest decision, with what operators did since.
+
+        :return: the decision.
+        """
         result = Decision(*self._decision.item())
         return result._replace(events=events_of(result)) if result.transitions else result
+
+    @property
+    def statistics(self) -> dict[str, int]:
+        """
+        Return the counts for a report.
+
+        :return: `occurrences`, `near_misses`, and `chatter`: 1 while alarms follow too quickly.
+        """
+        s = self.state[0]
+        return {'occurrences': int(s.occurrence), 'near_misses': int(s.near_misses),
+                'chatter': int(s.chatter)}
+
+    def acknowledge(self, occurrence: int | None = None) -> Outcome:
+        """
+        Note that a person has seen the alarm.
+
+        :param occurrence: number of the alarm; the present one where it is None.
+        :return: whether it was done, a sentence, and the events.
+        """
+        return self._outcome(alarm.acknowledge(self.state[0], occurrence))
+
+    def reset_alarm(self) -> Outcome:
+        """
+        Release the latch of an alarm whose condition has gone.
+
+        :return: whether it was done, a sentence, and the events.
+        """
+        return self._outcome(alarm.reset(self.state[0]))
+
+    def shelve(self, seconds: float) -> Outcome:
+        """
+        Mask alarms for a time.
+
+        :param seconds: how long, counted in stamps of the measurement.
+        :return: whether it was done, a sentence, and the events.
+        """
+        return self._outcome(alarm.shelve(self.state[0], seconds))
+
+    def unshelve(self) -> Outcome:
+        """
+        End a shelf before its time.
+
+        :return: whether it was done, a sentence, and the events.
+        """
+        return self._outcome(alarm.unshelve(self.state[0]))
+
+    def save(self) -> dict[str, Any]:
+        """
+        Return the state, alarms included, to be kept over a restart.
+
+        :return: plain numbers and lists by name, fit for JSON.
+        """
+        return {name: self.state[name][0].tolist() for name in STATE.names or ()}
+
+    def load(self, saved: Mapping[str, Any]) -> None:
+        """
+        Take up a state that `save` returned; the alarm goes on where it was.
+
+        :param saved: the state.
+        :raises ValueError: where it is not such a state; the present one is then untouched.
+        """
+        state = np.zeros(1, STATE)
+        wrong = sorted(set(saved) ^ set(STATE.names or ()))
+        if wrong:
+            raise ValueError(f'alarm state: {", ".join(wrong)} missing or unknown')
+        for name, value in saved.items():
+            try:
+                state[name][0] = value
+            except (TypeError, ValueError, OverflowError) as error:
+                raise ValueError(f'alarm state: {name} = {value!r}: {error}') from error
+        if not all(np.isfinite(state[name]).all() for name in STATE.names or ()):
+            raise ValueError('alarm state: a number is not finite')
+        self.state[:] = state
+        self._show(0)
+
+    def _outcome(self, answer: alarm.Answer) -> Outcome:
+        if not answer.transitions:
+            return Outcome(answer.done, answer.text, ())
+        self._show(answer.transitions)
+        return Outcome(answer.done, answer.text, tuple(self.decision.events))
+
+    def _show(self, transitions: int) -> None:
+        show(self.state, self._estimate, self._decision)
+        self._decision['transitions'] = transitions

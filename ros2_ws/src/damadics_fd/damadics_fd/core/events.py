@@ -6,7 +6,30 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from damadics_fd.core.alarm import NE107, TRANSITIONS
+from damadics_fd.core.alarm import (
+    CHANGED,
+    CLEARED,
+    FAILURE,
+    FUNCTION_CHECK,
+    MAINTENANCE_REQUIRED,
+    NE107,
+    NEAR_MISS,
+    NORMAL,
+    OUT_OF_SPECIFICATION,
+    RAISED,
+    SHELVED,
+    TRANSITIONS,
+    UNSHELVED,
+)
+
+STUCK = 5.0  # s without motion that are worth a word in the text of an alarm
+ADVICE = {
+    NORMAL: '',
+    MAINTENANCE_REQUIRED: 'acknowledge; plan an inspection of packing, spring and sensors',
+    OUT_OF_SPECIFICATION: 'acknowledge; inspect packing, spring and sensors soon',
+    FUNCTION_CHECK: 'alarms are shelved: inspect when the shelf ends',
+    FAILURE: 'acknowledge; inspect packing, spring and sensors now, consider manual operation',
+}
 
 
 @dataclass(frozen=True)
@@ -50,10 +73,29 @@ def events_of(decision: Any) -> tuple[Event, ...]:
 
 
 def _event(transition: int, d: Any) -> Event:
-    duration = (int(d.stamp) - int(d.onset)) * 1e-9 if d.onset else 0.0
-    name = TRANSITIONS[transition].replace('_', ' ')
-    text = (f'{name}: velocity residual {float(d.ratio):.2f} x threshold '
-            f'({float(d.residual):.3g} / {float(d.threshold):.3g} 1/s), '
-            f'largest {float(d.peak):.2f} x, {NE107[int(d.level)]}')
+    duration = max(int(d.stamp) - int(d.onset), 0) * 1e-9 if d.onset else 0.0
     return Event(transition, int(d.stamp), int(d.occurrence), int(d.level), int(d.onset),
-                 float(d.residual), float(d.threshold), float(d.peak), duration, text=text)
+                 float(d.residual), float(d.threshold), float(d.peak), duration,
+                 text=_text(transition, d, duration), advice=_advice(transition, d))
+
+
+def _text(transition: int, d: Any, duration: float) -> str:
+    name = TRANSITIONS[transition].replace('_', ' ')
+    number = '' if transition in (SHELVED, UNSHELVED, NEAR_MISS) else f' {int(d.occurrence)}'
+    text = (f'{name}{number}: velocity residual {float(d.ratio):.2f} x threshold '
+            f'({float(d.residual):.3g} / {float(d.threshold):.3g} 1/s)')
+    if transition in (RAISED, CHANGED):
+        text += f' for {duration:.3g} s, {NE107[int(d.level)]}'
+    elif transition == CLEARED:
+        text += f', at most {float(d.peak):.2f} x in {duration:.3g} s'
+    if transition in (RAISED, CHANGED) and d.still > STUCK:
+        text += f'; position frozen for {float(d.still):.0f} s: stem or position sensor'
+    return text
+
+
+def _advice(transition: int, d: Any) -> str:
+    if transition in (RAISED, CHANGED):
+        return ADVICE[int(d.level)]
+    if transition == CLEARED:
+        return 'acknowledge; reset after inspection or repair'
+    return ''

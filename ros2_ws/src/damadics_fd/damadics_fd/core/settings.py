@@ -122,7 +122,7 @@ class Settings:
     level_specification: float = _number('', 'residual/threshold of "out of specification"', 1.0,
                                          1e6, 1.5, 1.5)
     level_failure: float = _number('', 'residual/threshold of "failure"', 1.0, 1e6, 2.5, 2.5)
-    chatter: int = _number('1/min', 'alarms per minute that count as chatter', 2, 1000, 3, 3)
+    chatter: int = _number('1/min', 'alarms per minute that count as chatter', 2, 16, 3, 3)
 
     # learning
     t_on: float = _number('s', 'time for the filters to settle before learning', 0.0, 1e6,
