@@ -1,0 +1,285 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""From evidence to a named cause: families first, "undetermined" as an honest answer (2.7-2.9)."""
+
+import math
+from typing import Any
+
+from damadics_fd.core.jit import jit
+from damadics_fd.core.signature_cues import stick_evidence
+from damadics_fd.core.signature_evidence import clear_set, evaluate, joint_change, physical_value
+from damadics_fd.core.signature_types import (
+    CAUSE_ELASTIC,
+    CAUSE_FRICTION_DOWN,
+    CAUSE_FRICTION_UP,
+    CAUSE_NONE,
+    CAUSE_PRELOAD,
+    CAUSE_SPRING_SOFTER,
+    CAUSE_SPRING_STIFFER,
+    CAUSE_STICK_PLAY,
+    CAUSE_UNCONFIRMED,
+    CAUSE_UNDETERMINED,
+    FAMILY_ELASTIC,
+    FAMILY_FRICTION,
+    FAMILY_UNCONFIRMED,
+    FAMILY_UNDETERMINED,
+    FRICTION,
+    N_HYP,
+    N_SETS,
+    PRELOAD,
+    SET_ALARM,
+    SET_FAST,
+    SET_SLOW,
+    SPRING,
+    STATE_ALARM,
+    STATE_MONITOR,
+    STATE_VERIFY,
+)
+
+SECOND = 1_000_000_000  # [ns]
+FULL_EVIDENCE = 18.0  # blocks since the alarm, from which the fast set holds nothing older
+NULL_MOVING = 12.0  # blocks since the alarm
+NULL_STICK = 1.3  # stick range / reference
+P_STICK = 0.96
+STAGE2_EVIDENCE = 30.0
+STAGE2_STRIDE = 5
+D_VERIFY = 12.0  # largest D expected of a right model
+
+
+@jit
+def start_alarm(s: Any) -> None:
+    """
+    Begin to collect evidence on an alarm.
+
+    :param s: state record.
+    """
+    s.state = STATE_ALARM
+    s.since = s.t
+    s.alarm_t = s.t
+    s.b_p_until = s.t
+    s.n_alarm = 0.0
+    s.stage2 = 0
+    s.run_f = 0
+    s.run_e = 0
+    s.family = FAMILY_UNDETERMINED
+    s.cause = CAUSE_UNDETERMINED
+    s.second = 0
+    s.cause_value = math.nan
+    s.cause_std = math.nan
+    s.confidence = math.nan
+    s.r_max = 0.0
+    s.stick = 0
+    clear_set(s, SET_ALARM)
+
+
+@jit
+def end_alarm(s: Any) -> None:
+    """
+    Go back to monitoring (or verifying) with empty sums.
+
+    :param s: state record.
+    """
+    s.own = 0
+    s.own_t = 0
+    s.family = FAMILY_UNDETERMINED
+    s.cause = CAUSE_NONE
+    s.cause_value = math.nan
+    s.cause_std = math.nan
+    s.confidence = math.nan
+    s.r_max = 0.0
+    s.stick = 0
+    restart_sets(s)
+    s.state = STATE_MONITOR if s.verified else STATE_VERIFY
+    s.since = s.t
+
+
+@jit
+def restart_sets(s: Any) -> None:
+    """
+    Empty all accumulators.
+
+    :param s: state record.
+    """
+    for m in range(N_SETS):
+        clear_set(s, m)
+        s.d_max[m] = 0.0
+    s.n_moving = 0
+
+
+@jit
+def watch(s: Any, c: Any) -> None:
+    """
+    Look for a change on the three memories before any alarm (2.8).
+
+    A set is evaluated as often as its memory can change, and at every block once D is not
+    small. Where the whole misfit is below a limit, D is below it too and need not be computed.
+
+    :param s: state record; own is set if the own alarm is due.
+    :param c: settings record.
+    """
+    for m in range(SET_SLOW + 1):
+        s.due[m] += 1
+        if s.rr[m] < D_VERIFY * s.sigma * s.sigma:
+            s.D[m] = 0.0
+            s.over[m] = 0
+            continue
+        if s.D[m] < 0.5 * c.d_alarm and s.due[m] < c.memory[m] / 10.0:
+            continue
+        s.due[m] = 0
+        D = evaluate(s, c, m, c.model_error, 0.0, 0.0)
+        s.d_max[m] = max(s.d_max[m], D)
+        s.over[m] = s.over[m] + 1 if c.d_alarm < D else 0
+        if m == SET_SLOW and joint_change(s, c, m):
+            s.now_t = s.t
+        if s.over[m] >= c.n_alarm and s.state == STATE_MONITOR and own_alarm_allowed(s, c):
+            s.own = 1
+            s.own_t = s.t
+
+
+@jit
+def own_alarm_allowed(s: Any, c: Any) -> bool:
+    """
+    Tell whether the force model is good enough for an own alarm.
+
+    :param s: state record.
+    :param c: settings record.
+    :return: False where VERIFY found a poor plug force model or the user switched it off.
+    """
+    allowed: bool = c.own_alarm != 0 and s.verified != 0 and s.kappa <= c.kappa_max
+    return allowed
+
+
+@jit
+def decide(s: Any, c: Any) -> None:
+    """
+    Judge the alarm after a moving block.
+
+    :param s: state record; family, cause, value, std and confidence are written.
+    :param c: settings record.
+    """
+    s.n_alarm += s.w
+    b_r = stick_evidence(s)
+    b_p = 6.0 if s.t < s.b_p_until and s.ne[SET_ALARM] < STAGE2_EVIDENCE else 0.0
+    m = SET_ALARM
+    D = evaluate(s, c, m, c.model_error, b_r, b_p)
+    if s.ne[SET_ALARM] >= FULL_EVIDENCE and evaluate(s, c, SET_FAST, c.model_error, b_r, b_p) > D:
+        m = SET_FAST
+        D = s.D[m]
+    if c.d_decide < D:
+        p_f = math.exp(s.logp[m][FRICTION])
+        s.run_f = s.run_f + 1 if p_f > c.p_firm else 0
+        s.run_e = s.run_e + 1 if 1.0 - p_f > c.p_firm else 0
+        if s.run_f >= c.n_firm:
+            s.family = FAMILY_FRICTION
+        elif s.run_e >= c.n_firm:
+            s.family = FAMILY_ELASTIC
+        if s.family == FAMILY_FRICTION and p_f > 0.5:
+            name_friction(s, m, p_f)
+        elif s.family == FAMILY_ELASTIC and p_f < 0.5:
+            name_elastic(s, c, m, 1.0 - p_f)
+    elif s.n_alarm >= NULL_MOVING and s.r_max > NULL_STICK * s.r_ref:
+        s.run_e = 0
+        s.run_f += 1
+        if s.run_f >= c.n_firm:
+            s.family = FAMILY_FRICTION
+            s.cause = CAUSE_STICK_PLAY
+            s.confidence = P_STICK
+            s.cause_value = s.r_max / s.r_ref - 1.0
+            s.cause_std = math.nan
+    else:
+        s.run_f = 0
+        s.run_e = 0
+        doubt(s, c)
+    second_stage(s, c)
+
+
+@jit
+def doubt(s: Any, c: Any) -> None:
+    """
+    Say so if the moving valve does not confirm an alarm (2.9).
+
+    :param s: state record.
+    :param c: settings record.
+    """
+    waited = (s.t - s.alarm_t) * 1e-9 >= c.unconfirmed_after
+    if waited and s.n_alarm >= NULL_MOVING and s.family == FAMILY_UNDETERMINED:
+        s.family = FAMILY_UNCONFIRMED
+        s.cause = CAUSE_UNCONFIRMED
+
+
+@jit
+def name_friction(s: Any, m: int, p: float) -> None:
+    """
+    Report a firm friction change.
+
+    :param s: state record.
+    :param m: set with the evidence.
+    :param p: posterior of friction.
+    """
+    s.confidence = p
+    s.cause_value = s.value[m][FRICTION]
+    s.cause_std = s.sd[m][FRICTION]
+    s.cause = CAUSE_FRICTION_UP if s.cause_value >= 0.0 else CAUSE_FRICTION_DOWN
+
+
+@jit
+def name_elastic(s: Any, c: Any, m: int, p: float) -> None:
+    """
+    Report a firm change of the elastic family, by the spring until stage 2 knows better.
+
+    :param s: state record.
+    :param c: settings record.
+    :param m: set with the evidence.
+    :param p: posterior of the family.
+    """
+    if s.cause >= CAUSE_SPRING_STIFFER:
+        return  # named by stage 2
+    s.cause = CAUSE_ELASTIC
+    s.confidence = p
+    best = SPRING
+    for h in range(SPRING, N_HYP):
+        if s.logp[m][h] > s.logp[m][best]:
+            best = h
+    s.second = best
+    s.cause_value, s.cause_std = physical_value(s, c, m, best)
+
+
+@jit
+def second_stage(s: Any, c: Any) -> None:
+    """
+    Name the member of the elastic family from a longer record after the alarm.
+
+    :param s: state record.
+    :param c: settings record.
+    """
+    if s.stage2 == 0:
+        if (s.t - s.alarm_t) * 1e-9 >= c.stage2_delay:
+            s.stage2 = 1
+            clear_set(s, SET_SLOW)
+        return
+    m = SET_SLOW
+    s.due[m] += 1
+    if s.due[m] < STAGE2_STRIDE or s.ne[m] < STAGE2_EVIDENCE:
+        return
+    s.due[m] = 0
+    D = evaluate(s, c, m, c.model_error_stage2, 0.0, 0.0)
+    if joint_change(s, c, m):
+        s.now_t = s.t
+    if s.family != FAMILY_ELASTIC or c.d_decide >= D:
+        return
+    best = SPRING
+    total = 0.0
+    for h in range(SPRING, N_HYP):
+        total += math.exp(s.logp[m][h])
+        if s.logp[m][h] > s.logp[m][best]:
+            best = h
+    p = math.exp(s.logp[m][best]) / max(total, 1e-300)
+    s.second = best
+    s.cause_value, s.cause_std = physical_value(s, c, m, best)
+    s.confidence = p
+    if p <= c.p_firm:
+        s.cause = CAUSE_ELASTIC
+    elif best == SPRING:
+        s.cause = CAUSE_SPRING_STIFFER if s.cause_value >= 0.0 else CAUSE_SPRING_SOFTER
+    else:
+        s.cause = CAUSE_PRELOAD + best - PRELOAD

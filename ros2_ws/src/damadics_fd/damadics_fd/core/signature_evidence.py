@@ -1,0 +1,290 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Evidence for each hypothesis from exponentially weighted sums over moving blocks.
+
+Every hypothesis adds one or two columns to the reference model. The error of the reference
+is common to all of them, so it is eliminated once (Schur complement) and each hypothesis is a
+division. The result equals the restricted least squares of the specification term by term.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from damadics_fd.core.jit import jit
+from damadics_fd.core.signature_linalg import cholesky, forward, inverse
+from damadics_fd.core.signature_types import (
+    DP_OFFSET,
+    FRICTION,
+    N_COL,
+    N_HYP,
+    N_REF,
+    ONE,
+    POSITION_GAIN,
+    PRELOAD,
+    PRESSURE_GAIN,
+    SIGN,
+    SPRING,
+    TABLE,
+    X1,
+    V,
+)
+
+# column of hypotheses 2 to 7: x1, 1, position gain, chamber pressure, P1 - P2, position offset
+COLUMN = np.array([-1, -1, X1, ONE, N_REF + 3, N_REF, N_REF + 1, N_REF + 2])
+MIN_EVIDENCE = 4.0  # blocks
+SMALL = 2e-3  # [1] tolerance of the exclusions
+
+
+@jit
+def clear_set(s: Any, m: int) -> None:
+    """
+    Empty one accumulator.
+
+    :param s: state record.
+    :param m: index of the set.
+    """
+    s.S[m][:, :] = 0.0
+    s.q[m][:] = 0.0
+    s.rr[m] = 0.0
+    s.ne[m] = 0.0
+    s.vb[m] = 0.0
+    s.D[m] = 0.0
+    s.due[m] = 0
+    s.over[m] = 0
+
+
+@jit
+def accumulate(s: Any, m: int, forget: float, r: float) -> None:
+    """
+    Add the block under evaluation to one accumulator.
+
+    :param s: state record.
+    :param m: index of the set.
+    :param forget: l = 1 - 1/N; 1 to remember everything.
+    :param r: what the columns have to explain.
+    """
+    S = s.S[m]
+    q = s.q[m]
+    ph = s.ph
+    w = s.w
+    for i in range(N_COL):
+        a = w * ph[i]
+        for j in range(N_COL):
+            S[i, j] = forget * S[i, j] + a * ph[j]
+        q[i] = forget * q[i] + a * r
+    s.rr[m] = forget * s.rr[m] + w * r * r
+    s.ne[m] = forget * s.ne[m] + w
+    s.vb[m] = forget * s.vb[m] + w * abs(s.v)
+
+
+@jit
+def residual(s: Any) -> float:
+    """
+    Return what the reference does not explain of the force of the block.
+
+    :param s: state record.
+    :return: r = u - phi' theta0.
+    """
+    r: float = s.u
+    for i in range(N_REF):
+        r -= s.ph[i] * s.theta[i]
+    return r
+
+
+@jit
+def eliminate_reference(s: Any, m: int, iv: float) -> float:
+    """
+    Eliminate the error of the reference from one set.
+
+    :param s: state record; Gm and gv receive information matrix and vector of the columns
+        that remain (unit: 1 / variance of the change).
+    :param m: index of the set.
+    :param iv: 1 / variance of a block.
+    :return: J_0, the misfit without any change; negative if the sums are not usable.
+    """
+    S = s.S[m]
+    q = s.q[m]
+    L, Y, y0 = s.L, s.Y, s.y0
+    for i in range(N_REF):
+        for j in range(i + 1):
+            L[i, j] = iv * S[i, j] + s.J0[i, j]
+        for j in range(N_COL):
+            Y[i, j] = iv * S[i, j]
+        y0[i] = iv * q[i]
+    if not cholesky(L, L):
+        return -1.0
+    forward(L, Y)
+    for i in range(N_REF):
+        a = y0[i]
+        for k in range(i):
+            a -= L[i, k] * y0[k]
+        y0[i] = a / L[i, i]
+    J_0: float = iv * s.rr[m]
+    for i in range(N_REF):
+        J_0 -= y0[i] * y0[i]
+    for i in range(N_COL):
+        if TABLE <= i < N_REF:
+            continue
+        g = iv * q[i]
+        for k in range(N_REF):
+            g -= Y[k, i] * y0[k]
+        s.gv[i] = g
+        a = iv * S[i, i]
+        for k in range(N_REF):
+            a -= Y[k, i] * Y[k, i]
+        s.Gm[i, i] = max(a, 0.0)
+    return max(J_0, 0.0)
+
+
+@jit
+def cross_information(s: Any, m: int, iv: float, i: int, j: int) -> float:
+    """
+    Return one off-diagonal entry of the information matrix after `eliminate_reference`.
+
+    :param s: state record.
+    :param m: index of the set.
+    :param iv: 1 / variance of a block.
+    :param i: column.
+    :param j: column.
+    :return: the entry.
+    """
+    a: float = iv * s.S[m][i, j]
+    for k in range(N_REF):
+        a -= s.Y[k, i] * s.Y[k, j]
+    return a
+
+
+@jit
+def evaluate(s: Any, c: Any, m: int, eps: float, b_r: float, b_p: float) -> float:
+    """
+    Weigh the hypotheses on one set (2.5).
+
+    :param s: state record; logp, value, sd and D of the set are written.
+    :param c: settings record.
+    :param m: index of the set.
+    :param eps: model error as a share of the signal.
+    :param b_r: log evidence of the stick range for friction.
+    :param b_p: log evidence of passivity for the elastic family.
+    :return: D.
+    """
+    ne = s.ne[m]
+    s.D[m] = 0.0
+    if ne < 1.0 or (ne < MIN_EVIDENCE and b_r <= 0.0 and b_p <= 0.0):
+        return 0.0
+    sigma2 = s.sigma * s.sigma
+    iv = 1.0 / (sigma2 * max(1.0, eps * eps * s.rr[m] / (sigma2 * ne)))
+    J_0 = eliminate_reference(s, m, iv)
+    if J_0 < 0.0:
+        return 0.0
+    logp, value, std = s.logp[m], s.value[m], s.sd[m]
+    logp[0] = J_0  # first the misfits J_h
+    # friction: dry and viscous part together
+    a = s.Gm[SIGN, SIGN] + 1.0 / (c.change_std[1] * c.change_std[1])
+    b = cross_information(s, m, iv, SIGN, V)
+    d = s.Gm[V, V] + 1.0 / (c.change_std[0] * c.change_std[0])
+    det = a * d - b * b
+    d_s = (d * s.gv[SIGN] - b * s.gv[V]) / det
+    d_v = (a * s.gv[V] - b * s.gv[SIGN]) / det
+    v_mean = s.vb[m] / ne
+    scale = max(s.theta[SIGN] + s.theta[V] * v_mean, 1e-3)
+    value[FRICTION] = (d_s + d_v * v_mean) / scale
+    std[FRICTION] = math.sqrt((d - 2.0 * b * v_mean + a * v_mean * v_mean) / det) / scale
+    logp[FRICTION] = J_0 - d_s * s.gv[SIGN] - d_v * s.gv[V]
+    if value[FRICTION] < -1.3 - SMALL / scale:
+        logp[FRICTION] = J_0  # friction cannot become negative
+    for h in range(SPRING, N_HYP):
+        k = COLUMN[h]
+        info = s.Gm[k, k] + 1.0 / (c.change_std[h] * c.change_std[h])
+        value[h] = s.gv[k] / info
+        std[h] = 1.0 / math.sqrt(info)
+        logp[h] = J_0 - s.gv[k] * value[h]
+    value[SPRING] /= s.theta[X1]
+    std[SPRING] /= s.theta[X1]
+    if value[SPRING] < -1.05:
+        logp[SPRING] = J_0
+    J_min = logp[0]
+    for h in range(1, N_HYP):
+        J_min = min(J_min, logp[h])
+    sc = max(1.0, J_min / max(ne - 2.0, 1.0))
+    D: float = (J_0 - J_min) / sc + 2.0 * b_r
+    s.D[m] = D
+    # misfits to log posteriors, normalised over h >= 1
+    top = -1e300
+    for h in range(1, N_HYP):
+        logp[h] = math.log(c.prior[h]) - logp[h] / (2.0 * sc) + (b_r if h == FRICTION else b_p)
+        if h == FRICTION:
+            logp[h] -= 0.5 * math.log(ne)
+        top = max(top, logp[h])
+    total = 0.0
+    for h in range(1, N_HYP):
+        total += math.exp(logp[h] - top)
+    for h in range(1, N_HYP):
+        logp[h] -= top + math.log(total)
+    return D
+
+
+@jit
+def physical_value(s: Any, c: Any, m: int, h: int) -> tuple[float, float]:
+    """
+    Convert a change to what a person reads.
+
+    :param s: state record.
+    :param c: settings record.
+    :param m: index of the set.
+    :param h: hypothesis.
+    :return: value and standard deviation. Friction and spring as shares, preload in N, gains as
+        the sensor's gain error, P1 - P2 offset in Pa, position offset as share of the stroke.
+    """
+    value, std = s.value[m][h], s.sd[m][h]
+    if h == PRELOAD:
+        return value * c.force_scale, std * c.force_scale
+    if h in (POSITION_GAIN, PRESSURE_GAIN):
+        gain = 1.0 / max(1.0 - value, 1e-3)  # the column uses the measured, wrong value
+        return value * gain, std * gain * gain
+    if h == DP_OFFSET:
+        return -1e6 * value, 1e6 * std
+    return value, std
+
+
+@jit
+def joint_change(s: Any, c: Any, m: int) -> bool:
+    """
+    Estimate spring, preload and friction together, for the trends.
+
+    :param s: state record; now and now_std are written: dK/K0, preload in N, dF.
+    :param c: settings record.
+    :param m: index of the set.
+    :return: False if the set is not usable yet.
+    """
+    ne = s.ne[m]
+    if ne < 60.0:
+        return False
+    iv = 1.0 / (s.sigma * s.sigma)
+    if eliminate_reference(s, m, iv) < 0.0:
+        return False
+    columns = (X1, ONE, SIGN, V)
+    prior = (c.change_std[2], c.change_std[3], c.change_std[1], c.change_std[0])
+    H = np.empty((4, 4))
+    work = np.empty((4, 4))
+    for i in range(4):
+        H[i, i] = s.Gm[columns[i], columns[i]] + 1.0 / (prior[i] * prior[i])
+        for j in range(i):
+            H[i, j] = cross_information(s, m, iv, columns[i], columns[j])
+    if not inverse(H, work):
+        return False
+    d = np.zeros(4)
+    for i in range(4):
+        for j in range(4):
+            d[i] += H[i, j] * s.gv[columns[j]]
+    v = s.vb[m] / ne
+    scale = max(s.theta[SIGN] + s.theta[V] * v, 1e-3)
+    s.now[0] = d[0] / s.theta[X1]
+    s.now[1] = d[1] * c.force_scale
+    s.now[2] = (d[2] + d[3] * v) / scale
+    s.now_std[0] = math.sqrt(H[0, 0]) / s.theta[X1]
+    s.now_std[1] = math.sqrt(H[1, 1]) * c.force_scale
+    s.now_std[2] = math.sqrt(H[2, 2] + 2.0 * v * H[2, 3] + v * v * H[3, 3]) / scale
+    return True

@@ -1,0 +1,172 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""
+The fault-free valve: u = K x1 + b + c v + Fc sgn v + error of the plug force table.
+
+Stiffness, preload, viscous and dry friction are the reference proper. The correction of the
+plug force, a piecewise linear share of it over the position, belongs to the valve too: 1 % of
+the plug force is as large as the whole dry friction, and no table is known that well.
+"""
+
+import math
+from typing import Any
+
+from damadics_fd.core.jit import jit
+from damadics_fd.core.signature_evidence import accumulate, clear_set
+from damadics_fd.core.signature_linalg import inverse
+from damadics_fd.core.signature_types import (
+    N_REF,
+    N_TABLE,
+    SET_ALARM,
+    SIGN,
+    STATE_INSUFFICIENT,
+    STATE_LEARN,
+    TABLE,
+)
+
+INFLATION = 4.0  # model error of the reference, as a factor on its variance
+STICK_FLOOR = 0.005  # [1] lowest stick range to compare with
+
+
+@jit
+def start_learning(s: Any, c: Any) -> None:
+    """
+    Forget the reference and learn it anew.
+
+    :param s: state record.
+    :param c: settings record.
+    """
+    s.state = STATE_LEARN
+    s.verified = 0
+    s.kappa = 1.0
+    s.sigma = c.sigma_min
+    s.theta[:] = 0.0
+    s.J0[:, :] = 0.0
+    for i in range(TABLE):
+        s.theta[i] = c.theta_nominal[i]
+    clear_set(s, SET_ALARM)
+    s.n_up = 0
+    s.n_down = 0
+    s.x_low = 1.0
+    s.x_high = 0.0
+    s.r_max = 0.0
+    s.stick = 0
+    s.fill_n = 0
+    s.vent_n = 0
+
+
+@jit
+def learn_block(s: Any) -> None:
+    """
+    Add a moving block to the sums of the reference.
+
+    :param s: state record.
+    """
+    accumulate(s, SET_ALARM, 1.0, s.u)
+    if s.v > 0.0:
+        s.n_up += 1
+    else:
+        s.n_down += 1
+    s.x_low = min(s.x_low, s.x)
+    s.x_high = max(s.x_high, s.x)
+
+
+@jit
+def learning_progress(s: Any, c: Any) -> float:
+    """
+    Return the share of the learning that is done, by its slowest condition.
+
+    :param s: state record.
+    :param c: settings record.
+    :return: 0..1.
+    """
+    done: float = (s.t - s.t0) * 1e-9 / c.learn
+    done = min(done, s.n_up / c.learn_blocks)
+    done = min(done, s.n_down / c.learn_blocks)
+    done = min(done, s.ne[SET_ALARM] / c.learn_weight)
+    done = min(done, (s.x_high - s.x_low) / c.learn_range)
+    return max(0.0, min(1.0, done))
+
+
+@jit
+def finish_learning(s: Any, c: Any) -> bool:
+    """
+    Compute the reference if the valve has moved enough (2.3).
+
+    :param s: state record; theta, J0, sigma and r_ref are written.
+    :param c: settings record.
+    :return: True if learning is over.
+    """
+    if learning_progress(s, c) < 1.0:
+        if (s.t - s.t0) * 1e-9 >= 2.0 * c.learn:
+            s.state = STATE_INSUFFICIENT
+        return False
+    S, q, wn = s.S[SET_ALARM], s.q[SET_ALARM], s.ne[SET_ALARM]
+    H, work, J0 = s.Gm[:N_REF, :N_REF], s.L, s.J0
+    prior_precision(J0, c, work)
+    for i in range(N_REF):
+        for j in range(N_REF):
+            H[i, j] = S[i, j] + J0[i, j]
+    if not inverse(H, work):
+        return False
+    for i in range(N_REF):  # theta0 = H^-1 (q0 + Pi theta_nominal)
+        s.theta[i] = 0.0
+        for j in range(N_REF):
+            a = q[j]
+            for k in range(TABLE):
+                a += J0[j, k] * c.theta_nominal[k]
+            s.theta[i] += H[i, j] * a
+    misfit, freedom = s.rr[SET_ALARM], wn
+    for i in range(N_REF):
+        misfit -= 2.0 * s.theta[i] * q[i]
+        for j in range(N_REF):
+            misfit += s.theta[i] * S[i, j] * s.theta[j]
+            freedom -= H[i, j] * S[j, i]  # parameters that the data, not the prior, decide
+    s.sigma = max(c.sigma_min, math.sqrt(max(misfit, 0.0) / max(freedom, 1.0)))
+    for i in range(N_REF):
+        for j in range(N_REF):
+            J0[i, j] = INFLATION * s.sigma * s.sigma * H[i, j]
+        floor = c.floor[min(i, TABLE - 1)] if i < TABLE else c.plug_floor
+        J0[i, i] += floor * floor
+    if not inverse(J0, work):
+        return False
+    s.r_ref = max(s.r_max, max(2.4 * s.theta[SIGN], STICK_FLOOR))
+    clear_set(s, SET_ALARM)
+    return True
+
+
+@jit
+def prior_precision(Pi: Any, c: Any, work: Any) -> None:
+    """
+    Fill the prior information on the reference, scaled to the smallest block noise.
+
+    :param Pi: N_REF x N_REF, written.
+    :param c: settings record.
+    :param work: scratch of the same shape.
+    """
+    Pi[:, :] = 0.0
+    for i in range(TABLE):
+        Pi[i, i] = c.theta_std[i] * c.theta_std[i]
+    for i in range(N_TABLE):
+        for j in range(N_TABLE):
+            Pi[TABLE + i, TABLE + j] = c.plug_gain_std * c.plug_gain_std
+        Pi[TABLE + i, TABLE + i] += c.plug_shape_std * c.plug_shape_std
+    inverse(Pi, work)
+    for i in range(N_REF):
+        for j in range(N_REF):
+            Pi[i, j] *= c.sigma_min * c.sigma_min
+
+
+@jit
+def widen_reference(s: Any, kappa: float) -> None:
+    """
+    Take the misfit seen in VERIFY into the noise and the error of the reference (2.3b).
+
+    :param s: state record.
+    :param kappa: factor on the standard deviations, at least 1.
+    """
+    s.kappa = kappa
+    s.sigma *= kappa
+    for i in range(N_REF):
+        for j in range(N_REF):
+            s.J0[i, j] /= kappa * kappa

@@ -1,0 +1,230 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Numbers and memory of the valve signature: settings, state, enumerations.
+
+Units of the normalised model: position X = stem / stroke, forces in units of FN = K L
+(stiffness times stroke), time in seconds.
+"""
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+# -- regressor of one block -----------------------------------------------------------------
+N_TABLE = 11  # nodes 0, 0.1 .. 1 of the correction of the plug force table
+X1, ONE, V, SIGN = 0, 1, 2, 3  # stiffness, preload, viscous friction, dry friction
+TABLE = 4  # first of the plug force corrections
+N_REF = TABLE + N_TABLE  # columns of the reference model
+PB, G, POS, POSX = N_REF, N_REF + 1, N_REF + 2, N_REF + 3
+N_COL = N_REF + 4
+
+# -- accumulators ---------------------------------------------------------------------------
+SET_FAST, SET_MID, SET_SLOW, SET_ALARM = 0, 1, 2, 3
+N_SETS = 4
+
+# -- hypotheses -----------------------------------------------------------------------------
+N_HYP = 8
+NONE, FRICTION, SPRING, PRELOAD = range(4)
+POSITION_GAIN, PRESSURE_GAIN, DP_OFFSET, POSITION_OFFSET = range(4, N_HYP)
+
+# -- states of the signature, damadics_msgs/Signature ----------------------------------------
+STATE_UNAVAILABLE, STATE_LEARN, STATE_INSUFFICIENT, STATE_VERIFY = 0, 1, 2, 3
+STATE_MONITOR, STATE_ALARM = 4, 5
+
+# -- families of causes ---------------------------------------------------------------------
+FAMILY_UNDETERMINED, FAMILY_FRICTION, FAMILY_ELASTIC, FAMILY_UNCONFIRMED = 0, 1, 2, 3
+
+# -- causes: what a person is told ------------------------------------------------------------
+CAUSES = (
+    'none', 'undetermined', 'unconfirmed', 'friction_up', 'friction_down', 'stick_play',
+    'elastic', 'spring_stiffer', 'spring_softer', 'preload', 'position_gain', 'pressure_gain',
+    'dp_offset', 'position_offset', 'supply',
+)
+(
+    CAUSE_NONE, CAUSE_UNDETERMINED, CAUSE_UNCONFIRMED, CAUSE_FRICTION_UP, CAUSE_FRICTION_DOWN,
+    CAUSE_STICK_PLAY, CAUSE_ELASTIC, CAUSE_SPRING_STIFFER, CAUSE_SPRING_SOFTER, CAUSE_PRELOAD,
+    CAUSE_POSITION_GAIN, CAUSE_PRESSURE_GAIN, CAUSE_DP_OFFSET, CAUSE_POSITION_OFFSET,
+    CAUSE_SUPPLY,
+) = range(len(CAUSES))
+
+N_PLUG = 16  # capacity of the plug force table
+
+
+@dataclass(frozen=True)
+class SignatureSettings:
+    """
+    Settings of the valve signature of one actuator.
+
+    The geometry describes the valve, the rest follows the rules in docs/signature.md.
+    """
+
+    # geometry; defaults: DAMADICS actuator
+    force_scale: float = 60892.0 * 0.0381  # [N] FN = K L
+    preload: float = 0.25  # [1] X0 / stroke, so that x1 = X + preload
+    weight: float = 2.0 * 9.81  # [N] m g
+    diaphragm_area: float = 0.029  # [m2] Ae
+    plug_area: float = float(np.pi) * 0.05**2 / 4.0  # [m2]
+    plug_x: tuple[float, ...] = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.99, 1.0)
+    plug_km: tuple[float, ...] = (
+        1.0, 0.95, 0.90, 0.85, 0.785, 0.725, 0.67, 0.61, 0.555, 0.5, 0.45, 0.40,
+    )  # [1] Km(X): plug force (P1 - P2) / Km * plug_area
+    sample_period: float = 0.005  # [s] nominal
+    # blocks (2.1)
+    block: float = 0.1  # [s] Tb: a multiple of the periods of 50 Hz and 60 Hz
+    range_gate: float = 0.03  # [1] end stops and the steep end of the plug table
+    v_min: float = 0.02  # [1/s]
+    v_max: float = 1.5  # [1/s]
+    v_stribeck: float = 0.026  # [1/s] vs / L
+    stribeck_weight: float = 40.0  # [1] ((fs - fc) / (FN sigma))^2
+    # reference (2.3)
+    start: float = 5.0  # [s] the filters settle
+    learn: float = 60.0  # [s]
+    learn_blocks: int = 40  # moving blocks in each direction
+    learn_weight: float = 80.0
+    learn_range: float = 0.3  # [1]
+    theta_nominal: tuple[float, float, float, float] = (1.0, 0.0, 0.0246, 0.0108)  # K b c Fc
+    theta_std: tuple[float, float, float, float] = (0.10, 0.05, 0.02, 0.02)
+    plug_gain_std: float = 0.03  # [1] prior of the error of the plug force, common part
+    plug_shape_std: float = 0.01  # [1] and of each node of its table
+    floor: tuple[float, float, float, float] = (0.001, 0.0005, 0.001, 0.0003)
+    plug_floor: float = 0.0002
+    sigma_min: float = 4e-4  # [1]
+    # verification (2.3b)
+    verify: float = 60.0  # [s]
+    verify_blocks: int = 60  # moving blocks
+    kappa_max: float = 3.0
+    own_alarm: bool = True
+    # evidence (2.4, 2.5)
+    memory: tuple[float, float, float, float] = (6.0, 30.0, 300.0, 30.0)
+    change_std: tuple[float, ...] = (0.5, 0.2, 1.0, 0.2, 0.3, 0.3, 0.3, 0.1)  # v s | h = 2..7
+    prior: tuple[float, ...] = (1.0, 0.45, 0.45, 0.02, 0.02, 0.02, 0.02, 0.02)
+    model_error: float = 0.2  # eps
+    model_error_stage2: float = 0.03
+    # decision (2.6 - 2.9)
+    d_decide: float = 30.0
+    d_alarm: float = 40.0
+    p_firm: float = 0.95
+    n_firm: int = 3
+    n_alarm: int = 3
+    stage2_delay: float = 10.0  # [s]
+    unconfirmed_after: float = 60.0  # [s]
+    # material changes (2.8): smaller ones are reported without a maintenance level
+    material_friction: float = 0.3
+    material_spring: float = 0.02
+    # supply pressure from the top speed
+    supply_pressure: float = 600e3  # [Pa]
+    chamber_volume: float = 5.5e-3  # [m3] dead volume V0
+    stroke: float = 0.0381  # [m]
+
+    def __post_init__(self) -> None:
+        """Refuse settings that no valve can have."""
+        if len(self.plug_x) != len(self.plug_km) or not 2 <= len(self.plug_x) <= N_PLUG:
+            raise ValueError(
+                f'plug_x and plug_km must have the same 2 to {N_PLUG} entries, '
+                f'got {len(self.plug_x)} and {len(self.plug_km)}'
+            )
+        if np.any(np.diff(self.plug_x) <= 0.0) or min(self.plug_km) <= 0.0:
+            raise ValueError('plug_x must increase and plug_km must be positive')
+        for name in ('force_scale', 'diaphragm_area', 'sample_period', 'block', 'sigma_min'):
+            if not getattr(self, name) > 0.0:
+                raise ValueError(f'{name} must be positive, got {getattr(self, name)}')
+
+
+def _record(pairs: list[Any]) -> np.dtype:
+    return np.dtype((np.record, pairs))
+
+
+def _settings_dtype() -> np.dtype:
+    scalar = {float: 'f8', int: 'i8', bool: 'i8'}
+    spec: list[Any] = [
+        ('block_ns', 'i8'), ('min_samples', 'i8'), ('plug_n', 'i8'),
+        ('plug_x', 'f8', (N_PLUG,)), ('plug_km', 'f8', (N_PLUG,)),
+    ]
+    default = SignatureSettings()
+    for field in fields(SignatureSettings):
+        if field.name in ('plug_x', 'plug_km'):
+            continue
+        value = getattr(default, field.name)
+        if isinstance(value, tuple):
+            spec.append((field.name, 'f8', (len(value),)))
+        else:
+            spec.append((field.name, scalar[type(value)]))
+    return _record(spec)
+
+
+SETTINGS_DTYPE = _settings_dtype()
+
+
+def settings_record(settings: SignatureSettings) -> NDArray[np.void]:
+    """
+    Return the settings as the structured array that the compiled step reads.
+
+    :param settings: of one actuator.
+    :return: array of length 1.
+    """
+    array = np.zeros(1, SETTINGS_DTYPE)
+    for field in fields(settings):
+        if field.name not in ('plug_x', 'plug_km'):
+            array[field.name][0] = getattr(settings, field.name)
+    n = len(settings.plug_x)
+    array['plug_n'] = n
+    array['plug_x'][0, :n] = settings.plug_x
+    array['plug_km'][0, :n] = settings.plug_km
+    array['plug_km'][0, n:] = settings.plug_km[-1]
+    array['block_ns'] = round(settings.block * 1e9)
+    expected = settings.block / settings.sample_period
+    array['min_samples'] = max(1, int(np.ceil(0.75 * expected - 1e-9)))
+    return array
+
+
+# What a restarted node needs to go straight to MONITOR.
+REFERENCE_FIELDS: list[Any] = [
+    ('theta', 'f8', (N_REF,)), ('J0', 'f8', (N_REF, N_REF)), ('sigma', 'f8'), ('r_ref', 'f8'),
+    ('kappa', 'f8'), ('verified', 'i8'), ('fill_ref', 'f8'), ('vent_ref', 'f8'),
+    ('fill_n', 'i8'), ('vent_n', 'i8'),
+]
+REFERENCE_DTYPE = _record(REFERENCE_FIELDS)
+
+STATE_DTYPE = _record(
+    REFERENCE_FIELDS
+    + [
+        ('state', 'i8'), ('t0', 'i8'), ('t', 'i8'), ('since', 'i8'),
+        # block under construction
+        ('index', 'i8'), ('n', 'i8'), ('sx', 'f8'), ('su', 'f8'), ('sp', 'f8'), ('sg', 'f8'),
+        ('st', 'f8'),
+        # the last three blocks, newest last
+        ('run', 'i8'), ('bx', 'f8', (3,)), ('bu', 'f8', (3,)), ('bp', 'f8', (3,)),
+        ('bdp', 'f8', (3,)), ('bt', 'f8', (3,)),
+        # block under evaluation
+        ('moving', 'i8'), ('standing', 'i8'), ('x', 'f8'), ('u', 'f8'), ('v', 'f8'), ('w', 'f8'),
+        ('ph', 'f8', (N_COL,)),
+        # LEARN
+        ('n_up', 'i8'), ('n_down', 'i8'), ('x_low', 'f8'), ('x_high', 'f8'), ('n_moving', 'i8'),
+        # accumulators
+        ('S', 'f8', (N_SETS, N_COL, N_COL)), ('q', 'f8', (N_SETS, N_COL)),
+        ('rr', 'f8', (N_SETS,)), ('ne', 'f8', (N_SETS,)), ('vb', 'f8', (N_SETS,)),
+        # evidence of each set: D, log posteriors, changes, standard deviations
+        ('D', 'f8', (N_SETS,)), ('due', 'i8', (N_SETS,)), ('over', 'i8', (N_SETS,)),
+        ('logp', 'f8', (N_SETS, N_HYP)), ('value', 'f8', (N_SETS, N_HYP)),
+        ('sd', 'f8', (N_SETS, N_HYP)),
+        ('d_max', 'f8', (N_SETS,)),
+        # cues
+        ('stick', 'i8'), ('stick_x', 'f8'), ('stick_low', 'f8'), ('stick_high', 'f8'),
+        ('r_max', 'f8'), ('b_p_until', 'i8'),
+        # alarm and decision
+        ('alarm_in', 'i8'), ('own', 'i8'), ('alarm_t', 'i8'), ('own_t', 'i8'), ('stage2', 'i8'),
+        ('n_alarm', 'f8'), ('run_f', 'i8'), ('run_e', 'i8'), ('family', 'i8'), ('cause', 'i8'),
+        ('second', 'i8'), ('cause_value', 'f8'), ('cause_std', 'f8'), ('confidence', 'f8'),
+        # changes now: spring, preload, friction (joint estimate over the slow set)
+        ('now', 'f8', (3,)), ('now_std', 'f8', (3,)), ('now_t', 'i8'),
+        # air supply
+        ('stroke_dir', 'i8'), ('stroke_n', 'i8'), ('stroke_peak', 'f8', (3,)),
+        ('fill_rate', 'f8'), ('vent_rate', 'f8'), ('fill_low', 'i8'),
+        # work space of the compiled functions
+        ('L', 'f8', (N_REF, N_REF)), ('Y', 'f8', (N_REF, N_COL)), ('y0', 'f8', (N_REF,)),
+        ('Gm', 'f8', (N_COL, N_COL)), ('gv', 'f8', (N_COL,)),
+    ]
+)
