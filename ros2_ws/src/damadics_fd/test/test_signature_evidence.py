@@ -4,12 +4,10 @@
 
 import numpy as np
 import pytest
-
 from damadics_fd.core import signature_types as st
 from damadics_fd.core.signature_evidence import accumulate, evaluate, joint_change
 from damadics_fd.core.signature_linalg import cholesky, forward, inverse
 from damadics_fd.core.signature_types import (
-    G,
     N_COL,
     N_HYP,
     N_REF,
@@ -21,6 +19,7 @@ from damadics_fd.core.signature_types import (
     SIGN,
     STATE_DTYPE,
     X1,
+    G,
     SignatureSettings,
     V,
     settings_record,

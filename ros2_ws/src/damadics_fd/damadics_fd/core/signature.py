@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damadics_fd.core.jit import jit
+from damadics_fd.core.signature_air import supply_lost, track_air
 from damadics_fd.core.signature_blocks import add_sample, close_block, judge_block, open_block
 from damadics_fd.core.signature_cues import check_passivity, track_stick
 from damadics_fd.core.signature_decision import (
@@ -18,6 +19,7 @@ from damadics_fd.core.signature_decision import (
     end_alarm,
     restart_sets,
     start_alarm,
+    start_supply_alarm,
     watch,
 )
 from damadics_fd.core.signature_evidence import accumulate, residual
@@ -130,6 +132,7 @@ def judge(s: Any, c: Any) -> int:
     before = s.state * 10000 + s.family * 100 + s.cause
     judge_block(s, c)
     track_stick(s)
+    air = track_air(s, c, s.alarm_in == 0 and s.own == 0)
     if s.state == STATE_LEARN or s.state == STATE_INSUFFICIENT:
         if s.alarm_in == 0 and (s.t - s.t0) * 1e-9 >= c.start:
             if s.moving != 0:
@@ -146,6 +149,8 @@ def judge(s: Any, c: Any) -> int:
             monitor_block(s, c)
         if s.state == STATE_VERIFY:
             finish_verification(s, c)
+        elif air and s.state == STATE_MONITOR and supply_lost(s, c):
+            start_supply_alarm(s, c)
     return CHANGED if s.state * 10000 + s.family * 100 + s.cause != before else BLOCK
 
 

@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 from damadics_fd.core.jit import jit
+from damadics_fd.core.signature_air import restart_air, supply_change
 from damadics_fd.core.signature_cues import stick_evidence
 from damadics_fd.core.signature_evidence import clear_set, evaluate, joint_change, physical_value
 from damadics_fd.core.signature_types import (
@@ -17,10 +18,12 @@ from damadics_fd.core.signature_types import (
     CAUSE_SPRING_SOFTER,
     CAUSE_SPRING_STIFFER,
     CAUSE_STICK_PLAY,
+    CAUSE_SUPPLY,
     CAUSE_UNCONFIRMED,
     CAUSE_UNDETERMINED,
     FAMILY_ELASTIC,
     FAMILY_FRICTION,
+    FAMILY_SUPPLY,
     FAMILY_UNCONFIRMED,
     FAMILY_UNDETERMINED,
     FRICTION,
@@ -41,6 +44,7 @@ FULL_EVIDENCE = 18.0  # blocks since the alarm, from which the fast set holds no
 NULL_MOVING = 12.0  # blocks since the alarm
 NULL_STICK = 1.3  # stick range / reference
 P_STICK = 0.96
+P_SUPPLY = 0.95
 STAGE2_EVIDENCE = 30.0
 STAGE2_STRIDE = 5
 D_VERIFY = 12.0  # largest D expected of a right model
@@ -73,6 +77,23 @@ def start_alarm(s: Any) -> None:
 
 
 @jit
+def start_supply_alarm(s: Any, c: Any) -> None:
+    """
+    Raise the own alarm on a loss of supply pressure.
+
+    :param s: state record.
+    :param c: settings record.
+    """
+    start_alarm(s)
+    s.own = 1
+    s.own_t = s.t
+    s.family = FAMILY_SUPPLY
+    s.cause = CAUSE_SUPPLY
+    s.cause_value = supply_change(s, c)
+    s.confidence = P_SUPPLY
+
+
+@jit
 def end_alarm(s: Any) -> None:
     """
     Go back to monitoring (or verifying) with empty sums.
@@ -89,6 +110,7 @@ def end_alarm(s: Any) -> None:
     s.r_max = 0.0
     s.stick = 0
     restart_sets(s)
+    restart_air(s)
     s.state = STATE_MONITOR if s.verified else STATE_VERIFY
     s.since = s.t
 

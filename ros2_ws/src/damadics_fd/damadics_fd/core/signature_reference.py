@@ -12,6 +12,7 @@ import math
 from typing import Any
 
 from damadics_fd.core.jit import jit
+from damadics_fd.core.signature_air import forget_air
 from damadics_fd.core.signature_evidence import accumulate, clear_set
 from damadics_fd.core.signature_linalg import inverse
 from damadics_fd.core.signature_types import (
@@ -51,8 +52,7 @@ def start_learning(s: Any, c: Any) -> None:
     s.x_high = 0.0
     s.r_max = 0.0
     s.stick = 0
-    s.fill_n = 0
-    s.vent_n = 0
+    forget_air(s)
 
 
 @jit

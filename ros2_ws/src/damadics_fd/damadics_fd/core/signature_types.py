@@ -35,7 +35,7 @@ STATE_UNAVAILABLE, STATE_LEARN, STATE_INSUFFICIENT, STATE_VERIFY = 0, 1, 2, 3
 STATE_MONITOR, STATE_ALARM = 4, 5
 
 # -- families of causes ---------------------------------------------------------------------
-FAMILY_UNDETERMINED, FAMILY_FRICTION, FAMILY_ELASTIC, FAMILY_UNCONFIRMED = 0, 1, 2, 3
+FAMILY_UNDETERMINED, FAMILY_FRICTION, FAMILY_ELASTIC, FAMILY_UNCONFIRMED, FAMILY_SUPPLY = range(5)
 
 # -- causes: what a person is told ------------------------------------------------------------
 CAUSES = (
@@ -49,6 +49,9 @@ CAUSES = (
     CAUSE_POSITION_GAIN, CAUSE_PRESSURE_GAIN, CAUSE_DP_OFFSET, CAUSE_POSITION_OFFSET,
     CAUSE_SUPPLY,
 ) = range(len(CAUSES))
+
+FILL, VENT = 0, 1  # ways of the chamber's air
+STROKES = 8  # strokes each way that show the top rate
 
 N_PLUG = 16  # capacity of the plug force table
 
@@ -116,6 +119,7 @@ class SignatureSettings:
     material_spring: float = 0.02
     # supply pressure from the top speed
     supply_pressure: float = 600e3  # [Pa]
+    material_supply: float = 0.1  # [1] loss of the top filling rate
     chamber_volume: float = 5.5e-3  # [m3] dead volume V0
     stroke: float = 0.0381  # [m]
 
@@ -183,8 +187,7 @@ def settings_record(settings: SignatureSettings) -> NDArray[np.void]:
 # What a restarted node needs to go straight to MONITOR.
 REFERENCE_FIELDS: list[Any] = [
     ('theta', 'f8', (N_REF,)), ('J0', 'f8', (N_REF, N_REF)), ('sigma', 'f8'), ('r_ref', 'f8'),
-    ('kappa', 'f8'), ('verified', 'i8'), ('fill_ref', 'f8'), ('vent_ref', 'f8'),
-    ('fill_n', 'i8'), ('vent_n', 'i8'),
+    ('kappa', 'f8'), ('verified', 'i8'), ('air_learned', 'i8', (2,)), ('air_ref', 'f8', (2,)),
 ]
 REFERENCE_DTYPE = _record(REFERENCE_FIELDS)
 
@@ -221,8 +224,10 @@ STATE_DTYPE = _record(
         # changes now: spring, preload, friction (joint estimate over the slow set)
         ('now', 'f8', (3,)), ('now_std', 'f8', (3,)), ('now_t', 'i8'),
         # air supply
-        ('stroke_dir', 'i8'), ('stroke_n', 'i8'), ('stroke_peak', 'f8', (3,)),
-        ('fill_rate', 'f8'), ('vent_rate', 'f8'), ('fill_low', 'i8'),
+        ('air_way', 'i8'), ('air_n', 'i8'), ('air_moved', 'f8'), ('air_top', 'f8'),
+        ('air_second', 'f8'), ('air_ps', 'f8'), ('air_count', 'i8', (2,)),
+        ('air_ring', 'f8', (2, STROKES)), ('air_ring_ps', 'f8', (2, STROKES)),
+        ('air_rate', 'f8', (2,)), ('air_rate_ps', 'f8', (2,)),
         # work space of the compiled functions
         ('L', 'f8', (N_REF, N_REF)), ('Y', 'f8', (N_REF, N_COL)), ('y0', 'f8', (N_REF,)),
         ('Gm', 'f8', (N_COL, N_COL)), ('gv', 'f8', (N_COL,)),
