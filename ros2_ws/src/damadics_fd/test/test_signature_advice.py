@@ -3,7 +3,6 @@
 import math
 
 import pytest
-
 from damadics_fd.advice import CauseTableError, load_causes
 from damadics_fd.core.signature_types import CAUSES
 

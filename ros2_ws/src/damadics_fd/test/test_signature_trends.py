@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-
 from damadics_fd.core.signature_trend import fit_line, fit_recent
 from damadics_fd.trends import TrendFile
 
