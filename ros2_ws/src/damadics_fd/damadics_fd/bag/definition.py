@@ -1,0 +1,134 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Message definitions: the `ros2msg` text of a schema, and where ROS keeps it."""
+
+import json
+import os
+import re
+import sys
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+from damadics_fd.bag.errors import BagError
+
+SEPARATOR = '=' * 80
+PRIMITIVES = {
+    'bool': 'u1', 'byte': 'u1', 'char': 'u1', 'int8': 'i1', 'uint8': 'u1', 'int16': 'i2',
+    'uint16': 'u2', 'int32': 'i4', 'uint32': 'u4', 'int64': 'i8', 'uint64': 'u8',
+    'float32': 'f4', 'float64': 'f8',
+}
+_FIELD = re.compile(r'^([\w/]+)(<=\d+)?(\[(<=)?(\d*)\])?\s+(\w+)(\s+.*|\s*=.*)?$')
+_MOST_TYPES = 1000  # in one schema; a hostile file may say anything
+
+
+class Member(NamedTuple):
+    """One field of a message: `repeat` None is one value, -1 a sequence, otherwise an array."""
+
+    name: str
+    type: str
+    repeat: int | None
+
+
+Definition = dict[str, list[Member]]  # full type name, members
+
+
+def _full_name(name: str, package: str) -> str:
+    """Complete a type name as ROS resolves it."""
+    if name in PRIMITIVES or name in ('string', 'wstring'):
+        return name
+    parts = name.split('/')
+    if len(parts) == 1:
+        return 'std_msgs/msg/Header' if name == 'Header' else f'{package}/msg/{name}'
+    return f'{parts[0]}/msg/{parts[-1]}'
+
+
+def _members(text: str, package: str) -> list[Member]:
+    members = []
+    for line in text.splitlines():
+        code = line.split('#', 1)[0].strip()
+        match = _FIELD.match(code)
+        if not code or (match and (match[7] or '').lstrip().startswith('=')):
+            continue  # empty, comment or constant
+        if not match:
+            raise BagError(f'the message definition has a line that is no field: {line[:80]!r}')
+        kind = _full_name(match[1], package)
+        count = None if match[3] is None else -1 if match[4] or not match[5] else int(match[5])
+        members.append(Member(match[6], kind, count))
+    return members
+
+
+def parse_definition(name: str, text: str) -> Definition:
+    """
+    Parse the text of a `ros2msg` schema.
+
+    :param name: type of the message, `package/msg/Type`.
+    :param text: its definition, those of the types it contains following `MSG:` lines.
+    :return: the members of each type by its full name.
+    :raises BagError: where the text is no definition.
+
+    >>> parse_definition('a/msg/B', 'float64[3] x  # [m]')
+    {'a/msg/B': [Member(name='x', type='float64', repeat=3)]}
+    """
+    sections = re.split(r'^={80}\r?\nMSG: *(\S+) *\r?$', text, flags=re.MULTILINE)
+    if len(sections) > 2 * _MOST_TYPES:
+        raise BagError(f'the schema of {name} defines more than {_MOST_TYPES} types')
+    definition = {_full_name(name, ''): _members(sections[0], name.split('/')[0])}
+    for kind, body in zip(sections[1::2], sections[2::2], strict=True):
+        definition[_full_name(kind, '')] = _members(body, kind.split('/')[0])
+    for members in definition.values():
+        for member in members:
+            if member.type not in (*PRIMITIVES, 'string', 'wstring', *definition):
+                raise BagError(f'the schema of {name} does not define {member.type}')
+    return definition
+
+
+def _share_file(name: str, suffix: str) -> Path:
+    """Find an installed interface file the way ament does, then in the Python environment."""
+    try:
+        package, folder, short = name.split('/')
+    except ValueError:
+        raise BagError(f'{name!r} is not a message type; write package/msg/Type') from None
+    prefixes = [*os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep), sys.prefix]
+    for prefix in filter(None, prefixes):
+        path = Path(prefix, 'share', package, folder, short + suffix)
+        if path.is_file():
+            return path
+    raise BagError(
+        f'no installed definition of {name}; build the workspace and source env.sh'
+        ' (or install the package that defines it)'
+    )
+
+
+@cache
+def schema_text(name: str) -> str:
+    """
+    Return the commented definition of an installed message type with all types it contains.
+
+    :param name: `package/msg/Type`.
+    :return: text for a schema of encoding `ros2msg`.
+    :raises BagError: where the type is not installed.
+    """
+    bodies: dict[str, str] = {}
+    waiting = [name]
+    while waiting:
+        kind = waiting.pop(0)
+        if kind not in bodies:
+            bodies[kind] = _share_file(kind, '.msg').read_text(encoding='utf-8')
+            members = _members(bodies[kind], kind.split('/')[0])
+            waiting += [m.type for m in members if '/' in m.type]
+    top = bodies.pop(name)
+    return top + ''.join(f'{SEPARATOR}\nMSG: {kind}\n{text}' for kind, text in bodies.items())
+
+
+@cache
+def type_hash(name: str) -> str:
+    """
+    Return the REP-2016 hash of an installed message type.
+
+    :param name: `package/msg/Type`.
+    :return: `RIHS01_` and 64 hexadecimal digits.
+    :raises BagError: where the type is not installed.
+    """
+    hashes = json.loads(_share_file(name, '.json').read_text(encoding='utf-8'))['type_hashes']
+    return str(next(entry['hash_string'] for entry in hashes if entry['type_name'] == name))

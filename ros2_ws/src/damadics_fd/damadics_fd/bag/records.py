@@ -1,0 +1,200 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""
+The records of an MCAP file (https://mcap.dev/spec) as bytes.
+
+A file is: magic, Header, data section (Schema, Channel, Chunk, MessageIndex, Metadata, ...
+DataEnd), summary section, Footer, magic. Each record is an opcode (u8), the length of its content
+(u64) and the content, little endian throughout. A Chunk holds compressed Schema, Channel and
+Message records.
+"""
+
+import struct
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+from damadics_fd.bag.errors import BagError
+
+MAGIC = b'\x89MCAP0\r\n'
+
+
+class Op(IntEnum):
+    """Opcodes of the records."""
+
+    HEADER = 0x01
+    FOOTER = 0x02
+    SCHEMA = 0x03
+    CHANNEL = 0x04
+    MESSAGE = 0x05
+    CHUNK = 0x06
+    MESSAGE_INDEX = 0x07
+    CHUNK_INDEX = 0x08
+    ATTACHMENT = 0x09
+    ATTACHMENT_INDEX = 0x0A
+    STATISTICS = 0x0B
+    METADATA = 0x0C
+    METADATA_INDEX = 0x0D
+    SUMMARY_OFFSET = 0x0E
+    DATA_END = 0x0F
+
+
+HEAD = struct.Struct('<BQ')  # opcode, length of the content
+MESSAGE = struct.Struct('<BQHIQQ')  # head, channel, sequence, log time, publish time; then data
+CHUNK = struct.Struct('<QQQI')  # start, end, uncompressed size, uncompressed CRC
+CHUNK_INDEX = struct.Struct('<QQQQ')  # start, end, offset of the chunk, length of the chunk
+STATISTICS = struct.Struct('<QHIIIIQQ')
+FOOTER = struct.Struct('<QQI')  # start of the summary, of its offsets, CRC of the summary
+FOOTER_SIZE = HEAD.size + FOOTER.size
+
+
+@dataclass(frozen=True, slots=True)
+class Schema:
+    """Definition of a message type: `encoding` is `ros2msg` where `data` is the commented text."""
+
+    id: int
+    name: str
+    encoding: str
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """A topic in a file."""
+
+    id: int
+    schema_id: int
+    topic: str
+    message_encoding: str
+    metadata: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class ChunkHead:
+    """What a Chunk record says before its compressed records."""
+
+    start_time: int
+    end_time: int
+    size: int
+    crc: int
+    compression: str
+
+
+def record(op: Op, *parts: bytes) -> bytes:
+    """Put the head of a record before its content."""
+    content = b''.join(parts)
+    return HEAD.pack(op, len(content)) + content
+
+
+def string(text: str | bytes) -> bytes:
+    """Prefix a string with its length."""
+    data = text.encode() if isinstance(text, str) else text
+    return struct.pack('<I', len(data)) + data
+
+
+def string_map(entries: dict[str, str]) -> bytes:
+    """Encode a map of strings, prefixed with its length."""
+    return string(b''.join(string(key) + string(value) for key, value in entries.items()))
+
+
+def schema_record(schema: Schema) -> bytes:
+    """Encode a Schema record."""
+    head = struct.pack('<H', schema.id) + string(schema.name) + string(schema.encoding)
+    return record(Op.SCHEMA, head, string(schema.data))
+
+
+def channel_record(channel: Channel) -> bytes:
+    """Encode a Channel record."""
+    return record(
+        Op.CHANNEL,
+        struct.pack('<HH', channel.id, channel.schema_id),
+        string(channel.topic),
+        string(channel.message_encoding),
+        string_map(channel.metadata),
+    )
+
+
+class Fields:
+    """
+    Read the fields of one record in order.
+
+    :param content: the content of the record; any field that runs past its end is a `BagError`.
+    """
+
+    def __init__(self, content: bytes | memoryview):
+        self._content = memoryview(content)
+        self._at = 0
+
+    def take(self, size: int) -> memoryview:
+        """Return the next `size` bytes."""
+        if size > len(self._content) - self._at:
+            raise BagError('a record is shorter than its fields say')
+        self._at += size
+        return self._content[self._at - size:self._at]
+
+    def unpack(self, layout: struct.Struct) -> tuple:
+        """Return the next fields of fixed size."""
+        return layout.unpack(self.take(layout.size))
+
+    def bytes_(self) -> bytes:
+        """Return the next length-prefixed bytes."""
+        (size,) = struct.unpack('<I', self.take(4))
+        return bytes(self.take(size))
+
+    def string(self) -> str:
+        """Return the next string."""
+        try:
+            return self.bytes_().decode()
+        except UnicodeDecodeError as error:
+            raise BagError('a record holds a string that is not UTF-8') from error
+
+    def string_map(self) -> dict[str, str]:
+        """Return the next map of strings."""
+        inner = Fields(self.bytes_())
+        entries = {}
+        while inner.left:
+            key = inner.string()
+            entries[key] = inner.string()
+        return entries
+
+    @property
+    def left(self) -> int:
+        """Number of bytes not read yet."""
+        return len(self._content) - self._at
+
+    def rest(self) -> memoryview:
+        """Return everything not read yet."""
+        return self.take(self.left)
+
+
+_U16 = struct.Struct('<H')
+_U16_2 = struct.Struct('<HH')
+_U64 = struct.Struct('<Q')
+
+
+def parse_schema(content: bytes | memoryview) -> Schema:
+    """Decode a Schema record."""
+    fields = Fields(content)
+    (number,) = fields.unpack(_U16)
+    return Schema(number, fields.string(), fields.string(), fields.bytes_())
+
+
+def parse_channel(content: bytes | memoryview) -> Channel:
+    """Decode a Channel record."""
+    fields = Fields(content)
+    number, schema_id = fields.unpack(_U16_2)
+    return Channel(number, schema_id, fields.string(), fields.string(), fields.string_map())
+
+
+def parse_chunk(content: bytes | memoryview) -> tuple[ChunkHead, memoryview]:
+    """Decode a Chunk record into its head and its compressed records."""
+    fields = Fields(content)
+    start, end, size, crc = fields.unpack(CHUNK)
+    compression = fields.string()
+    (length,) = fields.unpack(_U64)
+    return ChunkHead(start, end, size, crc, compression), fields.take(length)
+
+
+def parse_metadata(content: bytes | memoryview) -> tuple[str, dict[str, str]]:
+    """Decode a Metadata record into its name and entries."""
+    fields = Fields(content)
+    return fields.string(), fields.string_map()

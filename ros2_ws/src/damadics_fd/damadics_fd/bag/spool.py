@@ -1,0 +1,89 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""The thread between the recorder's callbacks and the disk."""
+
+import threading
+import time
+from collections import deque
+
+from damadics_fd.bag.rosbag2 import Topic
+from damadics_fd.bag.writer import BagWriter
+
+Item = tuple[Topic, bytes, int]  # topic, serialised message, log time [ns]
+
+PERIOD = 0.05  # [s] between two looks at the queue
+RETRY_PERIOD = 1.0  # [s] between two attempts while the disk refuses
+
+
+class Spool:
+    """
+    Write queued messages to a bag from a thread of its own.
+
+    A slow disk delays nobody: messages wait in the queue. A full one is tried again every second;
+    with a quota, the oldest file of the bag makes room first. Beyond `most_waiting` messages the
+    newest are dropped and counted.
+
+    :param bag: bag to write; the thread owns it until `close` has returned.
+    :param rotate: remove the oldest file of the bag when the disk is full.
+    :param most_waiting: bound on the queue, in messages.
+    """
+
+    def __init__(self, bag: BagWriter, rotate: bool = False, most_waiting: int = 1_000_000):
+        self.bag = bag
+        self.dropped = 0
+        self.error = ''  # why nothing can be written at present
+        self._rotate = rotate
+        self._most_waiting = most_waiting
+        self._queue: deque[Item] = deque()
+        self.put = self._queue.append  # the whole work of a callback
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name='spool', daemon=True)
+        self._thread.start()
+
+    @property
+    def waiting(self) -> int:
+        """Messages in the queue."""
+        return len(self._queue)
+
+    @property
+    def received(self) -> int:
+        """Messages written, waiting or dropped."""
+        return sum(self.bag.counts.values()) + len(self._queue) + self.dropped
+
+    def _run(self) -> None:
+        retry_at = 0.0
+        while not self._stop.wait(PERIOD):
+            if time.monotonic() >= retry_at and not self._drain():
+                retry_at = time.monotonic() + RETRY_PERIOD
+            while len(self._queue) > self._most_waiting:
+                self._queue.pop()
+                self.dropped += 1
+
+    def _drain(self) -> bool:
+        """Write what is queued; tell whether the disk took it."""
+        try:
+            if self.error:
+                self.bag.flush()
+                self.error = ''
+            for _ in range(len(self._queue)):
+                topic, data, log_time = self._queue.popleft()
+                self.bag.write(topic, data, log_time, log_time)
+            self.bag.flush_if_due()
+        except OSError as error:
+            self.error = f'{error.strerror} ({self.bag.path})'
+            return self._rotate and self.bag.drop_oldest()
+        return True
+
+    def close(self) -> None:
+        """
+        Write everything that is queued and finish the bag.
+
+        :raises OSError: where the disk refuses; finished chunks stay readable.
+        """
+        self._stop.set()
+        self._thread.join()
+        while self._queue:
+            if not self._drain():
+                self.dropped += len(self._queue)
+                break
+        self.bag.close()

@@ -1,0 +1,317 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Write bags as rosbag2 does, so that `ros2 bag`, Foxglove, `rosbags` and `mcap` read them."""
+
+import io
+import os
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from damadics_fd.bag.cdr import encode_columns
+from damadics_fd.bag.definition import parse_definition, schema_text, type_hash
+from damadics_fd.bag.errors import BagError
+from damadics_fd.bag.mcap_writer import CHUNK_SIZE, McapWriter
+from damadics_fd.bag.rosbag2 import (
+    METADATA_FILE,
+    BagFile,
+    BagMetadata,
+    QosProfile,
+    Topic,
+    dump_yaml,
+    qos,
+)
+
+FLUSH_PERIOD = 0.5  # [s] a crash loses at most what came since the last flush
+NANO = 1_000_000_000
+
+
+class WholeWrites(io.RawIOBase):
+    """
+    A new file in which each write is complete or, where the disk is full, leaves no trace.
+
+    :param path: file to create or replace.
+    """
+
+    def __init__(self, path: Path):
+        self._fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666)
+        self._end = 0
+
+    def writable(self) -> bool:
+        """Tell that the file can be written."""
+        return True
+
+    def write(self, data: Any) -> int:
+        """Append all of `data`."""
+        view = memoryview(data).cast('B')
+        done = 0
+        try:
+            while done < len(view):
+                done += os.write(self._fd, view[done:])
+        except OSError:
+            os.ftruncate(self._fd, self._end)
+            os.lseek(self._fd, self._end, os.SEEK_SET)
+            raise
+        self._end += done
+        return done
+
+    def close(self) -> None:
+        """Close the file."""
+        if not self.closed:
+            super().close()
+            os.close(self._fd)
+
+
+class BagWriter:
+    """
+    Write one bag.
+
+    `path` names a bag directory, which gets `metadata.yaml` and `<name>_0.mcap`, `<name>_1.mcap`,
+    ...; or, where it ends in `.mcap`, a single file. An `OSError` while writing (disk full) loses
+    nothing: the messages stay in the open chunk, and the next `flush` tries again.
+
+    :param path: directory to create, or file to write.
+    :param split_bytes: start a new file once this one has so many bytes, 0 for never.
+    :param split_seconds: start a new file once this one spans so much log time, 0 for never.
+    :param quota_bytes: remove the oldest files of this bag beyond so many bytes, 0 for never.
+    :param chunk_size: uncompressed size of a chunk [B].
+    :param flush_period: greatest age of a message that is not yet in the file [s].
+    :param custom_data: entries for the `custom_data` of the bag.
+    :raises BagError: where the directory already holds something or cannot be created.
+    """
+
+    def __init__(
+        self, path: str | Path, *, split_bytes: int = 0, split_seconds: float = 0.0,
+        quota_bytes: int = 0, chunk_size: int = CHUNK_SIZE, flush_period: float = FLUSH_PERIOD,
+        custom_data: Mapping[str, str] | None = None,
+    ):
+        self.path = Path(path)
+        self._single = self.path.suffix == '.mcap'
+        if self._single and (split_bytes or split_seconds or quota_bytes):
+            raise BagError('a single .mcap file cannot be split; give a directory', path)
+        self._quota_bytes = quota_bytes
+        self._split_bytes = split_bytes or quota_bytes // 8
+        self._split_time = int(split_seconds * NANO)
+        self._chunk_size, self._flush_period = chunk_size, flush_period
+        self._custom_data = dict(custom_data or {})
+        self._topics: dict[str, Topic] = {}
+        self._channels: dict[str, int] = {}  # of the present file
+        self._schemas: dict[str, int] = {}
+        self._files: list[BagFile] = []
+        self._sizes: dict[str, int] = {}  # of the finished files
+        self._number = 0
+        self._create()
+        self._open()
+
+    def _create(self) -> None:
+        self._folder = self.path.parent if self._single else self.path
+        try:
+            if not self._single and self._folder.is_dir() and any(self._folder.iterdir()):
+                raise BagError('exists and is not empty; give the bag another name', self.path)
+            self._folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise BagError(f'cannot create the bag: {error.strerror}', self.path) from error
+
+    def _open(self) -> None:
+        name = self.path.name if self._single else f'{self.path.name}_{self._number}.mcap'
+        try:
+            self._stream = WholeWrites(self._folder / name)
+        except OSError as error:
+            raise BagError(f'cannot write: {error.strerror}', self._folder / name) from error
+        self._number += 1
+        self._channels.clear()
+        self._schemas.clear()
+        self._mcap = McapWriter(self._stream, chunk_size=self._chunk_size)
+        self._file = BagFile(name)
+        self._files.append(self._file)
+
+    def add_topic(
+        self, name: str, kind: str, offered_qos: Sequence[QosProfile] = (), hash_: str = '',
+    ) -> Topic:
+        """
+        Declare a topic; a second declaration returns the first.
+
+        :param name: fully qualified name of the topic.
+        :param kind: message type, `package/msg/Type`.
+        :param offered_qos: what its publishers offer, by `rosbag2.qos`; a topic that has neither
+            publisher nor message at the end is no part of the bag.
+        :param hash_: type hash, taken from the installed type where it is not given.
+        :raises BagError: where the message type is not installed.
+        """
+        if name not in self._topics:
+            schema_text(kind)  # refused here rather than with the first message
+            self._topics[name] = Topic(name, kind, list(offered_qos), hash_ or type_hash(kind))
+        return self._topics[name]
+
+    def _channel(self, topic: Topic) -> int:
+        """Return the channel of a topic in the present file."""
+        channel = self._channels.get(topic.name)
+        if channel is None:
+            if topic.type not in self._schemas:
+                text = schema_text(topic.type).encode()
+                self._schemas[topic.type] = self._mcap.add_schema(topic.type, 'ros2msg', text)
+            offered = [dict(profile) for profile in topic.offered_qos]
+            metadata = {
+                'offered_qos_profiles': dump_yaml(offered),
+                'topic_type_hash': topic.type_hash,
+            }
+            channel = self._mcap.add_channel(
+                self._schemas[topic.type], topic.name, 'cdr', metadata
+            )
+            self._channels[topic.name] = channel
+        return channel
+
+    def _note(self, topic: Topic, start: int, end: int, count: int) -> None:
+        file = self._file
+        if file.counts:
+            file.start, file.end = min(start, file.start), max(end, file.end)
+        else:
+            file.start, file.end = start, end
+        file.counts[topic.name] = file.counts.get(topic.name, 0) + count
+
+    def write(self, topic: Topic, data: bytes, log_time: int, publish_time: int) -> None:
+        """
+        Write one message.
+
+        :param topic: as returned by `add_topic`.
+        :param data: serialised message.
+        :param log_time: when it was received [ns].
+        :param publish_time: when it was published [ns].
+        """
+        if self._split_bytes or self._split_time:
+            self._split_if_due(log_time)
+        channel = self._channel(topic)
+        self._note(topic, log_time, log_time, 1)
+        self._mcap.add_message(channel, data, log_time, publish_time)
+
+    def write_columns(
+        self, stamp: NDArray[np.int64], messages: Mapping[str, Mapping[str, NDArray]],
+        frame_id: str,
+    ) -> None:
+        """
+        Write columns of stamped messages; at each stamp one message of each topic, in this order.
+
+        :param stamp: `header.stamp`, log and publish time of each row, ascending [ns].
+        :param messages: for each declared topic its columns by dotted field name.
+        :param frame_id: `header.frame_id` of all messages.
+        :raises BagError: where a column is no field of its message or no topic is declared.
+        """
+        if not len(stamp):
+            return
+        header = {'header.stamp.sec': stamp // NANO, 'header.stamp.nanosec': stamp % NANO}
+        channels = []
+        payloads = []
+        for name, columns in messages.items():
+            topic = self._topics[name]
+            definition = parse_definition(topic.type, schema_text(topic.type))
+            payloads.append(encode_columns(
+                definition, topic.type, {**header, **columns}, {'header.frame_id': frame_id}
+            ))
+            channels.append(self._channel(topic))
+            self._note(topic, int(stamp[0]), int(stamp[-1]), len(stamp))
+        self._mcap.add_rows(channels, stamp, payloads)
+
+    def _split_if_due(self, log_time: int) -> None:
+        file = self._file
+        too_big = self._split_bytes and self._mcap.position >= self._split_bytes
+        too_long = self._split_time and log_time - file.start >= self._split_time
+        if file.counts and (too_big or too_long):
+            self._finish_file()
+            self._open()
+            while self._quota_bytes and self.size > self._quota_bytes and self.drop_oldest():
+                pass
+
+    def drop_oldest(self) -> bool:
+        """Remove the oldest finished file of the bag; tell whether there was one."""
+        if len(self._files) < 2:
+            return False
+        file = self._files.pop(0)
+        (self._folder / file.path).unlink(missing_ok=True)
+        self._sizes.pop(file.path, None)
+        return True
+
+    def flush(self) -> None:
+        """Hand all messages to the operating system."""
+        self._mcap.flush()
+
+    def flush_if_due(self) -> None:
+        """Flush where the oldest message not yet in the file has reached the flush period."""
+        if self._mcap.pending and (
+            time.monotonic() - self._mcap.chunk_opened >= self._flush_period
+        ):
+            self._mcap.flush()
+
+    @property
+    def size(self) -> int:
+        """Bytes in all files of the bag."""
+        return sum(self._sizes.values()) + self._mcap.position
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Messages in the bag by topic."""
+        return {
+            name: sum(file.counts.get(name, 0) for file in self._files) for name in self._topics
+        }
+
+    def _metadata(self) -> BagMetadata:
+        return BagMetadata(self._present(), self._files, self._custom_data)
+
+    def _present(self) -> list[Topic]:
+        counts = self.counts
+        return [t for t in list(self._topics.values()) if t.offered_qos or counts[t.name]]
+
+    def _finish_file(self) -> None:
+        for topic in self._present():
+            self._channel(topic)  # a topic without messages is part of the bag, too
+        entries = {'serialized_metadata': self._metadata().to_yaml(root=False)}
+        self._mcap.add_metadata('rosbag2', entries)
+        self._mcap.finish()
+        self._stream.close()
+        self._sizes[self._file.path] = self._mcap.position
+        if not self._single:
+            text = self._metadata().to_yaml()
+            (self._folder / METADATA_FILE).write_text(text, encoding='utf-8')
+
+    def close(self) -> None:
+        """Finish the last file and write `metadata.yaml`."""
+        if not self._stream.closed:
+            self._finish_file()
+            self._mcap.position = 0  # counted with the finished files
+
+    def __enter__(self) -> 'BagWriter':
+        """Return the writer."""
+        return self
+
+    def __exit__(self, *exception: Any) -> None:
+        """Close the bag."""
+        self.close()
+
+
+def write_columns(
+    path: str | Path, columns: Mapping[str, NDArray], frame_id: str = 'LC74_20',
+) -> None:
+    """
+    Write simulated or converted columns as the recorder would have written them.
+
+    :param path: `.mcap` file or bag directory.
+    :param columns: `stamp` [ns] and fields of `damadics_msgs/Measurement`, NaN if absent; with
+        `fault` and `strength` also the topic `/fault_state`.
+    :param frame_id: tag of the actuator.
+    :raises BagError: where the file cannot be written or the messages are not built.
+    """
+    stamp = np.asarray(columns['stamp'], np.int64)
+    names = ('cv', 'x1', 'p1', 'p2', 't1', 'flow', 'ps')
+    missing = np.full(len(stamp), np.nan)
+    messages = {'/measurement': {name: columns.get(name, missing) for name in names}}
+    kinds = {'/measurement': 'damadics_msgs/msg/Measurement'}
+    if 'fault' in columns:
+        messages['/fault_state'] = {name: columns[name] for name in ('strength', 'fault')}
+        kinds['/fault_state'] = 'damadics_msgs/msg/FaultState'
+    with BagWriter(path) as bag:
+        for name, kind in kinds.items():
+            bag.add_topic(name, kind, [qos(depth=1000)])
+        bag.write_columns(stamp, messages, frame_id)
