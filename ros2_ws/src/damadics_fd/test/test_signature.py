@@ -7,6 +7,7 @@ The stem follows random set-points at limited speed; the chamber pressure is wha
 asks for. Sensor noise and hum are those of the benchmark.
 """
 
+import json
 from functools import cache
 from pathlib import Path
 
@@ -135,12 +136,18 @@ def test_a_saved_reference_continues_where_it_was():
     columns = valve(seed=8, dK=-0.03, seconds=330.0)
     learned, _ = run(columns, keep=slice(0, 28000))
     restarted = Signature(C)
-    restarted.restore(learned.reference)
+    restarted.load(json.loads(json.dumps(learned.save())))
     assert restarted.view().state == st.STATE_MONITOR
     run(columns, restarted, keep=slice(28000, None))
     assert restarted.view().cause == 'spring_softer'
-    with pytest.raises(ValueError, match='learn the valve again'):
-        restarted.restore(np.zeros(1, st.REFERENCE_DTYPE))
+    good = learned.save()
+    assert Signature(C).save() == {}
+    before = restarted.state.tobytes()
+    for wrong in ({**good, 'theta': [1.0]}, {**good, 'sigma': 0.0}, {'theta': 1}, {},
+                  {**good, 'J0': 'x'}, {**good, 'sigma': np.nan}):
+        with pytest.raises(ValueError, match='signature reference'):
+            restarted.load(wrong)
+    assert restarted.state.tobytes() == before
 
 
 def test_missing_samples_cost_blocks_not_truth():

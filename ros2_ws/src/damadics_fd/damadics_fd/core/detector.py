@@ -8,11 +8,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from damadics_fd.core import alarm, decision
+from damadics_fd.core import alarm, decision, signature
 from damadics_fd.core.estimator import ESTIMATE, Estimate
 from damadics_fd.core.events import Event, events_of
 from damadics_fd.core.jit import jit
+from damadics_fd.core.modes import PHASE_HOLD, PHASE_PAPER
 from damadics_fd.core.settings import Settings
+from damadics_fd.core.signature import Signature
+from damadics_fd.core.signature_types import SignatureSettings
 from damadics_fd.core.threshold import threshold
 
 LARGE = 1e9  # ratio to a threshold of zero
@@ -20,6 +23,7 @@ DECISION = np.dtype((np.record, np.dtype([
     ('stamp', 'i8'), ('residual', 'f8'), ('threshold', 'f8'), ('ratio', 'f8'), ('exceed', '?'),
     ('fault', '?'), ('state', 'i8'), ('level', 'i8'), ('since', 'i8'), ('onset', 'i8'),
     ('occurrence', 'i8'), ('acknowledged', '?'), ('peak', 'f8'), ('still', 'f8'),
+    ('cause', 'i8'), ('strength', 'f8'), ('spread', 'f8'), ('confidence', 'f8'),
     ('transitions', 'i8'),
 ], align=True)))
 STATE = np.dtype((np.record, np.dtype([
@@ -46,6 +50,10 @@ class Decision(NamedTuple):
     acknowledged: bool
     peak: float  # largest ratio of this fault
     still: float  # time since the stem last moved by 1 % of its stroke [s]
+    cause: int  # as in damadics_msgs/Signature
+    strength: float  # change in the unit of the cause, 0 if unknown
+    spread: float  # its standard deviation, 0 if unknown
+    confidence: float  # probability of the cause, 0 if unknown
     transitions: int  # bit n: transition n of damadics_msgs/FaultEvent
     events: Sequence[Event] = ()
 
@@ -59,12 +67,14 @@ class Outcome(NamedTuple):
 
 
 @jit
-def step(s: Any, c: Any, e: Any, d: Any) -> None:
+def step(s: Any, c: Any, g: Any, gc: Any, e: Any, d: Any) -> None:
     """
     Judge one estimate.
 
     :param s: state record.
     :param c: settings record.
+    :param g: state record of the signature.
+    :param gc: settings record of the signature.
     :param e: estimate record.
     :param d: decision record, written.
     """
@@ -78,8 +88,14 @@ def step(s: Any, c: Any, e: Any, d: Any) -> None:
         level = decision.vote(s, c, exceed, ratio)
     else:
         decision.clear(s)
-    d.transitions = alarm.step(s, c, e.stamp, armed, exceed, s.count[0] > 0, level,
-                               ratio)
+    cause = g.cause
+    ready = e.phase not in (PHASE_PAPER, PHASE_HOLD)
+    signature.step(g, gc, e.stamp, e.x1, e.ps, e.dp, ready, s.active or s.latched)
+    own = signature.own_level(g, gc)
+    d.transitions = alarm.step(s, c, e.stamp, armed, exceed or own > 0, s.count[0] > 0,
+                               max(level, own), ratio)
+    if g.cause != cause and s.active:
+        d.transitions |= 1 << alarm.CHANGED
     d.residual = residual
     d.threshold = rho
     d.ratio = ratio
@@ -87,15 +103,17 @@ def step(s: Any, c: Any, e: Any, d: Any) -> None:
     if s.moved < 0 or e.stamp < s.moved or abs(e.x1 - s.place) > STIR:
         s.place = e.x1
         s.moved = e.stamp
-    report(s, e, d)
+    report(s, g, gc, e, d)
 
 
 @jit
-def report(s: Any, e: Any, d: Any) -> None:
+def report(s: Any, g: Any, gc: Any, e: Any, d: Any) -> None:
     """
     Copy the state of the alarm into a decision.
 
     :param s: state record.
+    :param g: state record of the signature.
+    :param gc: settings record of the signature.
     :param e: estimate record.
     :param d: decision record, written.
     """
@@ -103,6 +121,8 @@ def report(s: Any, e: Any, d: Any) -> None:
     d.stamp = e.stamp
     d.state = alarm.state_of(s, armed, e.phase)
     d.level = alarm.level_of(s, armed)
+    if s.flag and s.peak < 1.0 and not signature.material(g, gc):
+        d.level = alarm.NORMAL  # the approximator is content and the change is small
     d.fault = s.flag
     d.since = s.since
     d.onset = s.onset if s.active or s.latched else 0
@@ -110,31 +130,39 @@ def report(s: Any, e: Any, d: Any) -> None:
     d.acknowledged = s.acknowledged
     d.peak = s.peak
     d.still = (e.stamp - s.moved) * 1e-9
+    d.cause = g.cause
+    d.strength = g.cause_value
+    d.spread = g.cause_std
+    d.confidence = g.confidence
 
 
 @jit
-def update(s: NDArray, c: NDArray, e: NDArray, d: NDArray) -> None:
+def update(s: NDArray, c: NDArray, g: NDArray, gc: NDArray, e: NDArray, d: NDArray) -> None:
     """
     Judge one estimate; `step` for arrays of length 1, to be called from Python.
 
     :param s: detector state.
     :param c: settings.
+    :param g: state of the signature.
+    :param gc: settings of the signature.
     :param e: estimate.
     :param d: decision, written.
     """
-    step(s[0], c[0], e[0], d[0])
+    step(s[0], c[0], g[0], gc[0], e[0], d[0])
 
 
 @jit
-def show(s: NDArray, e: NDArray, d: NDArray) -> None:
+def show(s: NDArray, g: NDArray, gc: NDArray, e: NDArray, d: NDArray) -> None:
     """
     Copy the state of the alarm into a decision; `report` for arrays of length 1.
 
     :param s: detector state.
+    :param g: state of the signature.
+    :param gc: settings of the signature.
     :param e: the latest estimate.
     :param d: decision, written.
     """
-    report(s[0], e[0], d[0])
+    report(s[0], g[0], gc[0], e[0], d[0])
 
 
 class Detector:
@@ -147,6 +175,7 @@ class Detector:
     def __init__(self, settings: Settings) -> None:
         self.settings = settings
         self.state = np.zeros(1, STATE)
+        self.signature = Signature(SignatureSettings.of(settings))
         self._settings = settings.record()
         self._estimate = np.zeros(1, ESTIMATE)
         self._decision = np.zeros(1, DECISION)
@@ -156,6 +185,7 @@ class Detector:
         """Forget everything, alarms too."""
         self.state[:] = np.zeros(1, STATE)
         self._decision[:] = np.zeros(1, DECISION)
+        self.signature.relearn()
         alarm.begin(self.state[0])
         self.state['moved'] = -1
 
@@ -167,7 +197,8 @@ class Detector:
         :return: the decision; `events` holds the transitions of the alarm at this sample.
         """
         self._estimate[0] = estimate
-        update(self.state, self._settings, self._estimate, self._decision)
+        update(self.state, self._settings, self.signature.state, self.signature.record,
+               self._estimate, self._decision)
         return self.decision
 
     @property
@@ -261,5 +292,6 @@ class Detector:
         return Outcome(answer.done, answer.text, tuple(self.decision.events))
 
     def _show(self, transitions: int) -> None:
-        show(self.state, self._estimate, self._decision)
+        show(self.state, self.signature.state, self.signature.record, self._estimate,
+             self._decision)
         self._decision['transitions'] = transitions

@@ -21,6 +21,7 @@ from damadics_fd.core.alarm import (
     TRANSITIONS,
     UNSHELVED,
 )
+from damadics_fd.core.signature_types import CAUSES, known
 
 STUCK = 5.0  # s without motion that are worth a word in the text of an alarm
 ADVICE = {
@@ -47,7 +48,8 @@ class Event:
     duration: float  # [s] since the onset
     cause: str = ''
     confidence: float = math.nan
-    strength: float = math.nan
+    strength: float = math.nan  # change in the unit of the cause
+    spread: float = math.nan  # its standard deviation
     text: str = ''
     advice: str = ''
 
@@ -73,9 +75,11 @@ def events_of(decision: Any) -> tuple[Event, ...]:
 
 
 def _event(transition: int, d: Any) -> Event:
+    strength, spread, confidence = known(d.strength, d.spread, d.confidence)
     duration = max(int(d.stamp) - int(d.onset), 0) * 1e-9 if d.onset else 0.0
     return Event(transition, int(d.stamp), int(d.occurrence), int(d.level), int(d.onset),
                  float(d.residual), float(d.threshold), float(d.peak), duration,
+                 CAUSES[int(d.cause)] if d.cause else '', confidence, strength, spread,
                  text=_text(transition, d, duration), advice=_advice(transition, d))
 
 

@@ -74,9 +74,10 @@ class Result:
 
 
 @jit
-def loop(q: NDArray, s: NDArray, ds: NDArray, c: NDArray, stamp: NDArray, cv: NDArray,
-         x1: NDArray, p1: NDArray, p2: NDArray, t1: NDArray, flow: NDArray, ps: NDArray,
-         reason: NDArray, estimates: NDArray, decisions: NDArray) -> None:
+def loop(q: NDArray, s: NDArray, ds: NDArray, c: NDArray, g: NDArray, gc: NDArray,
+         stamp: NDArray, cv: NDArray, x1: NDArray, p1: NDArray, p2: NDArray, t1: NDArray,
+         flow: NDArray, ps: NDArray, reason: NDArray, estimates: NDArray,
+         decisions: NDArray) -> None:
     """
     Run `estimator.step` and `detector.step` over columns.
 
@@ -84,6 +85,8 @@ def loop(q: NDArray, s: NDArray, ds: NDArray, c: NDArray, stamp: NDArray, cv: ND
     :param s: estimator state.
     :param ds: detector state.
     :param c: settings.
+    :param g: state of the signature.
+    :param gc: settings of the signature.
     :param stamp: stamps [ns].
     :param cv: control values.
     :param x1: positions.
@@ -100,7 +103,7 @@ def loop(q: NDArray, s: NDArray, ds: NDArray, c: NDArray, stamp: NDArray, cv: ND
         reason[i] = estimating.step(q[0], s[0], c[0], estimates[i], stamp[i], cv[i], x1[i], p1[i],
                                     p2[i], t1[i], flow[i], ps[i])
         if reason[i] == 0:
-            detecting.step(ds[0], c[0], estimates[i], decisions[i])
+            detecting.step(ds[0], c[0], g[0], gc[0], estimates[i], decisions[i])
 
 
 def run(columns: Mapping[str, NDArray[Any]], settings: Settings,
@@ -132,8 +135,9 @@ def run(columns: Mapping[str, NDArray[Any]], settings: Settings,
     estimates = np.zeros(len(stamp), ESTIMATE)
     decisions = np.zeros(len(stamp), DECISION)
     cv, x1, p1, p2, t1, flow, ps = signals
-    loop(estimator.quality, estimator.state, detector.state, settings.record(), stamp, cv, x1,
-         p1, p2, t1, flow, ps, reason, estimates, decisions)
+    loop(estimator.quality, estimator.state, detector.state, settings.record(),
+         detector.signature.state, detector.signature.record, stamp, cv, x1, p1, p2, t1, flow, ps,
+         reason, estimates, decisions)
     _blank(reason, stamp, estimates, decisions)
     return Result(reason, estimates, decisions, estimator, detector)
 

@@ -151,6 +151,25 @@ class Settings:
         'unit': '', 'description': 'K_m of the plug force at 0, 10, .., 90, 99, 100 % of stroke',
         'low': 0.01, 'high': 10.0, 'default': {'paper': PLUG_TABLE, 'monitor': PLUG_TABLE}})
 
+    # the valve signature
+    signature: bool = _switch('tell friction, spring and sensors apart; needs ps', False, True)
+    own_alarm: bool = _switch('alarm on changes that the approximator cannot see', False, True)
+    verify: float = _number('s', 'time to check the force model after learning; half an hour on '
+                            'a real valve', 0.0, 1e6, 60.0, 60.0)
+    plug_gain_std: float = _number('', 'how well the plug force is known: standard deviation of '
+                                   'its gain', 1e-9, 1.0, 0.03, 0.03)
+    plug_shape_std: float = _number('', 'and of each entry of its table', 1e-9, 1.0, 0.01, 0.01)
+    material_friction: float = _number('', 'change of friction that asks for maintenance', 0.0,
+                                       100.0, 0.3, 0.3)
+    material_spring: float = _number('', 'change of stiffness that asks for maintenance', 0.0,
+                                     1.0, 0.02, 0.02)
+    material_supply: float = _number('', "loss of the chamber's top filling rate that alarms",
+                                     0.01, 0.9, 0.1, 0.1)
+    supply_pressure: float = _number('Pa', 'supply pressure of the positioner, gauge', 1e4, 5e6,
+                                     600e3, 600e3)
+    chamber_volume: float = _number('m3', 'dead volume of the servomotor', 0.0, 10.0, 5.5e-3,
+                                    5.5e-3)
+
     # input check
     signal_low: float = _number('', 'cv and x1 below it are refused (NAMUR NE 43: 3.6 mA)', -1.0,
                                 0.0, -0.025, -0.025)

@@ -3,11 +3,11 @@
 """The valve signature: friction, spring or sensor; small and slow changes; how large."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from damadics_fd.core.jit import jit
 from damadics_fd.core.signature_air import supply_lost, track_air
@@ -15,6 +15,7 @@ from damadics_fd.core.signature_blocks import add_sample, close_block, judge_blo
 from damadics_fd.core.signature_cues import check_passivity, track_stick
 from damadics_fd.core.signature_decision import (
     D_VERIFY,
+    FULL_EVIDENCE,
     decide,
     end_alarm,
     restart_sets,
@@ -31,6 +32,11 @@ from damadics_fd.core.signature_reference import (
     widen_reference,
 )
 from damadics_fd.core.signature_types import (
+    CAUSE_FRICTION_DOWN,
+    CAUSE_FRICTION_UP,
+    CAUSE_SPRING_SOFTER,
+    CAUSE_SPRING_STIFFER,
+    CAUSE_SUPPLY,
     CAUSES,
     REFERENCE_DTYPE,
     SET_ALARM,
@@ -43,31 +49,33 @@ from damadics_fd.core.signature_types import (
     STATE_UNAVAILABLE,
     STATE_VERIFY,
     SignatureSettings,
+    known,
     settings_record,
 )
 
+UNKNOWN = ('air_rate', 'now', 'now_std')
 QUIET, BLOCK, CHANGED = 0, 1, 2  # what a step returns: nothing new, a block, a new judgement
 
 
 @jit
 def step(
-    state: Any, settings: Any, t: int, x: float, ps: float, dp: float, ready: bool, alarm: bool
+    s: Any, c: Any, t: int, x: float, ps: float, dp: float, ready: bool, alarm: bool
 ) -> int:
     """
     Take one accepted sample.
 
-    :param state: structured array of length 1 (STATE_DTYPE).
-    :param settings: structured array of length 1 (SETTINGS_DTYPE).
+    :param s: state record.
+    :param c: settings record.
     :param t: [ns] stamp.
     :param x: [1] raw stem position / stroke.
     :param ps: [Pa] chamber pressure, gauge; NaN where not measured.
     :param dp: [Pa] P1 - P2.
     :param ready: False while the filters settle or the input is interrupted.
-    :param alarm: the approximator's alarm.
+    :param alarm: an alarm is present or latched, whoever raised it.
     :return: QUIET, BLOCK (a block was judged) or CHANGED (state, family or cause are new).
     """
-    s = state[0]
-    c = settings[0]
+    if c.available == 0:
+        return QUIET
     if not (ready and math.isfinite(x) and math.isfinite(ps) and math.isfinite(dp)):
         s.run = 0
         s.n = 0
@@ -80,6 +88,8 @@ def step(
         start_learning(s, c)
     if t <= s.t and s.index >= 0:
         return QUIET  # nothing older than the newest sample is used
+    if t < s.t:
+        shift_clock(s, t - s.t)
     gap = t - s.t
     s.t = t
     result = QUIET
@@ -100,7 +110,7 @@ def step(
 @jit
 def take_alarm(s: Any, c: Any) -> int:
     """
-    Follow an edge of the approximator's alarm.
+    Follow an edge of the alarm.
 
     :param s: state record.
     :param c: settings record.
@@ -115,9 +125,78 @@ def take_alarm(s: Any, c: Any) -> int:
         start_learning(s, c)  # what has been seen may be the fault
     elif s.alarm_in != 0 and s.state != STATE_ALARM:
         start_alarm(s)
-    elif s.alarm_in == 0 and s.own == 0 and s.state == STATE_ALARM:
+    elif s.alarm_in == 0 and s.state == STATE_ALARM:
         end_alarm(s)
     return CHANGED
+
+
+@jit
+def shift_clock(s: Any, shift: int) -> None:
+    """
+    Go on after an interruption in which the clock was set back.
+
+    :param s: state record.
+    :param shift: [ns] new time minus old time.
+    """
+    s.t += shift
+    s.t0 += shift
+    s.since += shift
+    s.alarm_t += shift
+    s.own_t += shift
+    s.b_p_until += shift
+
+
+@jit
+def update(
+    s: Any, c: Any, t: int, x: float, ps: float, dp: float, ready: bool, alarm: bool
+) -> int:
+    """
+    Take one accepted sample; `step` for arrays of length 1, to be called from Python.
+
+    :param s: state.
+    :param c: settings.
+    :param t: [ns] stamp.
+    :param x: [1] raw stem position / stroke.
+    :param ps: [Pa] chamber pressure, gauge; NaN where not measured.
+    :param dp: [Pa] P1 - P2.
+    :param ready: False while the filters settle or the input is interrupted.
+    :param alarm: an alarm is present or latched, whoever raised it.
+    :return: QUIET, BLOCK or CHANGED.
+    """
+    return step(s[0], c[0], t, x, ps, dp, ready, alarm)
+
+
+@jit
+def own_level(s: Any, c: Any) -> int:
+    """
+    Tell the detector whether the own alarm's condition is present.
+
+    :param s: state record.
+    :param c: settings record.
+    :return: 1 while it is, else 0.
+    """
+    if s.own == 0:
+        return 0
+    if s.cause == CAUSE_SUPPLY:
+        return 1 if supply_lost(s, c) else 0
+    early = s.ne[SET_ALARM] < FULL_EVIDENCE
+    return 1 if early or s.D[SET_ALARM] > c.d_decide else 0
+
+
+@jit
+def material(s: Any, c: Any) -> bool:
+    """
+    Tell whether the present change matters for maintenance (2.8).
+
+    :param s: state record.
+    :param c: settings record.
+    :return: False for a named friction or spring change that is certainly small.
+    """
+    if s.cause in (CAUSE_FRICTION_UP, CAUSE_FRICTION_DOWN):
+        return abs(s.cause_value) + 2.0 * s.cause_std >= c.material_friction
+    if s.cause in (CAUSE_SPRING_STIFFER, CAUSE_SPRING_SOFTER):
+        return abs(s.cause_value) + 2.0 * s.cause_std >= c.material_spring
+    return True
 
 
 @jit
@@ -225,6 +304,7 @@ class Signature:
         self.settings = settings
         self.record = settings_record(settings)
         self.state = np.zeros(1, STATE_DTYPE)
+        self.relearn()
 
     def update(
         self, t: int, x: float, ps: float, dp: float, ready: bool = True, alarm: bool = False
@@ -237,10 +317,10 @@ class Signature:
         :param ps: [Pa] chamber pressure, gauge; NaN where not measured.
         :param dp: [Pa] P1 - P2.
         :param ready: False while the filters settle or the input is interrupted.
-        :param alarm: the approximator's alarm.
+        :param alarm: an alarm is present or latched, whoever raised it.
         :return: QUIET, BLOCK or CHANGED.
         """
-        result: int = step(self.state, self.record, t, x, ps, dp, ready, alarm)
+        result: int = update(self.state, self.record, t, x, ps, dp, ready, alarm)
         return result
 
     def clear(self) -> None:
@@ -249,7 +329,9 @@ class Signature:
 
     def relearn(self) -> None:
         """Forget the reference and learn it anew from the next sample on."""
-        self.state = np.zeros(1, STATE_DTYPE)
+        self.state[:] = np.zeros(1, STATE_DTYPE)
+        for name in UNKNOWN:
+            self.state[name] = math.nan
 
     @property
     def progress(self) -> float:
@@ -258,34 +340,49 @@ class Signature:
             return 1.0
         return float(learning_progress(self.state[0], self.record[0]))
 
-    @property
-    def reference(self) -> NDArray[np.void]:
-        """What a restarted node needs: copy of the reference, array of length 1."""
-        out = np.zeros(1, REFERENCE_DTYPE)
-        for name in out.dtype.names or ():
-            out[name] = self.state[name]
-        return out
+    def save(self) -> dict[str, Any]:
+        """
+        Return the reference, to be kept over a restart.
 
-    def restore(self, reference: NDArray[np.void]) -> None:
+        :return: plain numbers and lists by name, fit for JSON; empty while nothing is learned.
+        """
+        if self.state['state'][0] < STATE_VERIFY:
+            return {}
+        return {name: self.state[name][0].tolist() for name in REFERENCE_DTYPE.names or ()}
+
+    def load(self, saved: Mapping[str, Any]) -> None:
         """
         Start from a saved reference instead of learning.
 
-        :param reference: as returned by `reference`.
-        :raises ValueError: if it holds no learned valve.
+        :param saved: as returned by `save`.
+        :raises ValueError: where it is no such reference; the present state is then untouched.
         """
-        if reference.dtype != REFERENCE_DTYPE or not float(reference['sigma'][0]) > 0.0:
-            raise ValueError('no valid signature reference: learn the valve again')
-        self.state = np.zeros(1, STATE_DTYPE)
-        for name in REFERENCE_DTYPE.names or ():
-            self.state[name] = reference[name]
-        verified = bool(reference['verified'][0])
-        self.state['state'] = STATE_MONITOR if verified else STATE_VERIFY
-        self.state['index'] = -1
+        wrong = sorted(set(saved) ^ set(REFERENCE_DTYPE.names or ()))
+        if wrong:
+            raise ValueError(f'signature reference: {", ".join(wrong)} missing or unknown')
+        state = np.zeros(1, STATE_DTYPE)
+        for name, value in saved.items():
+            try:
+                given = np.asarray(value, state[name].dtype)
+            except (TypeError, ValueError, OverflowError) as error:
+                raise ValueError(f'signature reference: {name} does not fit: {error}') from error
+            if given.shape != state[name].shape[1:]:
+                raise ValueError(f'signature reference: {name} has the shape {given.shape}')
+            state[name][0] = given
+            if not np.isfinite(state[name]).all():
+                raise ValueError(f'signature reference: {name} is not finite')
+        if not (state['sigma'][0] > 0.0 and state['r_ref'][0] > 0.0 and state['kappa'][0] >= 1.0):
+            raise ValueError('signature reference: sigma, r_ref and kappa must be positive')
+        state['state'] = STATE_MONITOR if state['verified'][0] else STATE_VERIFY
+        state['index'] = -1
+        for name in UNKNOWN:
+            state[name] = math.nan
+        self.state[:] = state
 
     def view(self) -> SignatureView:
         """Return the present judgement."""
         s = self.state[0]
+        value, std, confidence = known(s.cause_value, s.cause_std, s.confidence)
         return SignatureView(
-            int(s.state), int(s.family), CAUSES[int(s.cause)], float(s.cause_value),
-            float(s.cause_std), float(s.confidence),
+            int(s.state), int(s.family), CAUSES[int(s.cause)], value, std, confidence
         )

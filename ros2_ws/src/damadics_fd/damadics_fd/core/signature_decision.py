@@ -51,6 +51,18 @@ D_VERIFY = 12.0  # largest D expected of a right model
 
 
 @jit
+def forget_cause(s: Any) -> None:
+    """
+    Set value, deviation and confidence to 0: unknown.
+
+    :param s: state record.
+    """
+    s.cause_value = 0.0
+    s.cause_std = 0.0
+    s.confidence = 0.0
+
+
+@jit
 def start_alarm(s: Any) -> None:
     """
     Begin to collect evidence on an alarm.
@@ -68,9 +80,7 @@ def start_alarm(s: Any) -> None:
     s.family = FAMILY_UNDETERMINED
     s.cause = CAUSE_UNDETERMINED
     s.second = 0
-    s.cause_value = math.nan
-    s.cause_std = math.nan
-    s.confidence = math.nan
+    forget_cause(s)
     s.r_max = 0.0
     s.stick = 0
     clear_set(s, SET_ALARM)
@@ -104,9 +114,7 @@ def end_alarm(s: Any) -> None:
     s.own_t = 0
     s.family = FAMILY_UNDETERMINED
     s.cause = CAUSE_NONE
-    s.cause_value = math.nan
-    s.cause_std = math.nan
-    s.confidence = math.nan
+    forget_cause(s)
     s.r_max = 0.0
     s.stick = 0
     restart_sets(s)
@@ -207,7 +215,7 @@ def decide(s: Any, c: Any) -> None:
             s.cause = CAUSE_STICK_PLAY
             s.confidence = P_STICK
             s.cause_value = s.r_max / s.r_ref - 1.0
-            s.cause_std = math.nan
+            s.cause_std = 0.0
     else:
         s.run_f = 0
         s.run_e = 0

@@ -7,11 +7,14 @@ Units of the normalised model: position X = stem / stroke, forces in units of FN
 (stiffness times stroke), time in seconds.
 """
 
+import math
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
+
+from damadics_fd.core.settings import Settings
 
 # -- regressor of one block -----------------------------------------------------------------
 N_TABLE = 11  # nodes 0, 0.1 .. 1 of the correction of the plug force table
@@ -53,6 +56,7 @@ CAUSES = (
 FILL, VENT = 0, 1  # ways of the chamber's air
 STROKES = 8  # strokes each way that show the top rate
 
+MIN_RATE = 40.0  # [Hz] fewer samples make no block mean
 N_PLUG = 16  # capacity of the plug force table
 
 
@@ -74,6 +78,7 @@ class SignatureSettings:
     plug_km: tuple[float, ...] = (
         1.0, 0.95, 0.90, 0.85, 0.785, 0.725, 0.67, 0.61, 0.555, 0.5, 0.45, 0.40,
     )  # [1] Km(X): plug force (P1 - P2) / Km * plug_area
+    available: bool = True  # False: nothing is done
     sample_period: float = 0.005  # [s] nominal
     # blocks (2.1)
     block: float = 0.1  # [s] Tb: a multiple of the periods of 50 Hz and 60 Hz
@@ -122,6 +127,29 @@ class SignatureSettings:
     material_supply: float = 0.1  # [1] loss of the top filling rate
     chamber_volume: float = 5.5e-3  # [m3] dead volume V0
     stroke: float = 0.0381  # [m]
+
+    @classmethod
+    def of(cls, settings: Settings) -> Self:
+        """
+        Return the settings of the signature of an actuator.
+
+        :param settings: of its estimator and detector.
+        :return: geometry and choices taken over, the rest by default.
+        """
+        c = settings
+        return cls(
+            force_scale=c.stiffness * c.stroke, preload=c.preload, weight=c.mass * c.gravity,
+            diaphragm_area=c.area, plug_area=math.pi * c.plug_diameter**2 / 4.0,
+            plug_km=c.plug_table, stroke=c.stroke,
+            theta_nominal=(1.0, 0.0, c.alpha1 / c.alpha4, cls.theta_nominal[SIGN]),
+            sample_period=1.0 / c.sample_rate,
+            available=c.signature and c.sample_rate >= MIN_RATE,
+            own_alarm=c.own_alarm, verify=c.verify, start=c.t_on, learn=c.t_learn,
+            plug_gain_std=c.plug_gain_std, plug_shape_std=c.plug_shape_std,
+            material_friction=c.material_friction, material_spring=c.material_spring,
+            material_supply=c.material_supply, supply_pressure=c.supply_pressure,
+            chamber_volume=c.chamber_volume,
+        )
 
     def __post_init__(self) -> None:
         """Refuse settings that no valve can have."""
@@ -233,3 +261,17 @@ STATE_DTYPE = _record(
         ('Gm', 'f8', (N_COL, N_COL)), ('gv', 'f8', (N_COL,)),
     ]
 )
+
+
+def known(value: float, std: float, confidence: float) -> tuple[float, float, float]:
+    """
+    Put NaN in place of what is not known, which the state keeps as 0.
+
+    :param value: change in the unit of the cause.
+    :param std: its standard deviation.
+    :param confidence: probability of the cause.
+    :return: the three.
+    """
+    if confidence <= 0.0:
+        return math.nan, math.nan, math.nan
+    return float(value), float(std) if std > 0.0 else math.nan, float(confidence)
