@@ -1,0 +1,272 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Name the fault: one-parameter models of every fault fitted to both residuals since the onset.
+
+Each hypothesis predicts X' (reduced model with the fault's block) and F' (valve equation with the
+fault's law) from one strength. Its cost is the log-likelihood of both with unknown error variance,
+bounded below by what the fault-free record shows; the smallest cost ranks first.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from damadics_fd.core.jit import jit
+from damadics_fd.core.scada.actuator import F_RANGE, P_RANGE, T_RANGE, valve_flow
+from damadics_fd.core.scada.cusum import P1, P2, R1, R2, T1, TESTS
+from damadics_fd.core.scada.model import FAULTS, STEM, STEM_FAULTS, advance_stem, copy_stem
+from damadics_fd.core.scada.step import HISTORY_LENGTH
+
+WINDOW = 900  # samples at most
+SHORTEST = 20
+MINIMUM_ERROR = 1e-12
+INCIPIENT_ONLY = frozenset({3, 4, 5, 6, 9})  # no physical background as abrupt faults
+ABRUPT_PRIOR = 8.0  # nats against them after an abrupt onset
+EQUAL = 4.0  # nats within which two faults are not told apart
+NAMES = {
+    1: 'valve clogging', 2: 'plug or seat sedimentation', 3: 'plug or seat erosion',
+    4: 'valve or bushing friction', 5: 'external leakage', 6: 'internal leakage',
+    7: 'evaporation or critical flow', 9: 'servomotor housing leak', 10: 'diaphragm perforation',
+    11: 'servomotor spring', 12: 'electro-pneumatic transducer', 13: 'stem position sensor',
+    15: 'positioner feedback', 16: 'supply pressure drop', 17: 'pressure change across the valve',
+    18: 'bypass opened', 19: 'flow sensor',
+}  # fmt: skip
+GROUPS = {
+    'medium': (7,),
+    'pressures': (17,),
+    'flow path or flow sensor': (5, 6, 18, 19),
+    'plug, seat or position sensor': (2, 3, 13),
+    'actuator or positioner': (1, 4, 9, 10, 11, 12, 15, 16),
+}
+TWO_SIDED = frozenset({12, 13, 19})
+FLOW_FAULTS = frozenset({2, 3, 5, 6, 13, 18, 19})
+HYPOTHESES = tuple(n for n in NAMES if n not in (7, 17))
+GRID = (0.03, 0.15, 0.35, 0.6, 0.85)
+GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """
+    One fault as an explanation.
+
+    :param fault: number of the benchmark.
+    :param strength: fitted strength.
+    :param cost: negative log-likelihood, nats; only differences mean something.
+    """
+
+    fault: int
+    strength: float
+    cost: float
+
+
+@dataclass(frozen=True)
+class Isolation:
+    """
+    Faults that explain the record since the onset, best first.
+
+    :param t: time of the last sample used, s.
+    :param samples: samples used.
+    :param ranking: hypotheses in ascending order of cost.
+    """
+
+    t: float
+    samples: int
+    ranking: tuple[Hypothesis, ...]
+
+    @property
+    def best(self) -> Hypothesis:
+        """Return the explanation that fits best."""
+        return self.ranking[0]
+
+    @property
+    def group(self) -> str:
+        """Return the group of the best explanation."""
+        return group_of(self.best.fault)
+
+    @property
+    def candidates(self) -> tuple[int, ...]:
+        """Return the faults that the record does not tell apart from the best one."""
+        return tuple(h.fault for h in self.ranking if h.cost <= self.best.cost + EQUAL)
+
+    def text(self) -> str:
+        """Return one line for the person who gets the alarm."""
+        named = ' or '.join(f'f{fault} {NAMES[fault]}' for fault in self.candidates[:3])
+        return f'{self.group}: {named}, strength {self.best.strength:+.2f}'
+
+
+def group_of(fault: int) -> str:
+    """
+    Return the group of a fault, 'not observable' where the signals do not show it.
+
+    >>> group_of(4)
+    'actuator or positioner'
+    """
+    return next((name for name, faults in GROUPS.items() if fault in faults), 'not observable')
+
+
+@jit
+def _stem_error(
+    window: np.ndarray, act: Any, fault: Any, stem: Any
+) -> Any:
+    """Return the mean squared error of X' under a fault that is present in the whole window."""
+    copy_stem(window[0].stem, stem)
+    total = 0.0
+    for i in range(window.shape[0]):
+        e = window[i]
+        x = advance_stem(
+            stem, act, fault, e.t0, e.t, e.cv0, e.cv, e.dp0, e.dp, e.slope0, e.slope
+        )
+        total += (e.x - x - e.correction) ** 2
+    return total / window.shape[0]
+
+
+@jit
+def _flow_error(
+    window: np.ndarray, act: Any, fault: Any, g0: float, g1: float
+) -> float:
+    """Return the mean squared error of F' in units of its sigma; NaN where F' is not measured."""
+    offset = 0.2 * fault.f2 - 0.1 * fault.f3
+    scale = (1.0 - 0.2 * fault.f2) * (1.0 + 0.1 * fault.f3)
+    gain = (1.0 - 0.05 * fault.f5) * (1.0 - fault.f19)
+    sensor = 1.0 + 1.25 * fault.f13
+    total = 0.0
+    n = 0
+    for i in range(window.shape[0]):
+        e = window[i]
+        if math.isnan(e.flow) or math.isnan(e.t1):
+            continue
+        flow = valve_flow(
+            act, e.x / sensor, e.p1 * P_RANGE, e.p2 * P_RANGE, e.t1 * T_RANGE,
+            offset, scale, 0.1 * fault.f6, fault.f18,
+        )  # fmt: skip
+        f = min(1.0, gain * (g0 + g1 * flow / F_RANGE))
+        total += ((e.flow - f) / e.sq) ** 2
+        n += 1
+    return total / n if n else math.nan
+
+
+class Isolator:
+    """
+    Rank the faults for one monitor.
+
+    :param settings: record of `SETTINGS`.
+    :param reference: record of `REFERENCE`.
+    """
+
+    def __init__(self, settings: Any, reference: Any) -> None:
+        self._act = settings['act']
+        self._ref = reference
+        self._stem = np.zeros(1, STEM)
+        tests = [test.residual for test in TESTS]
+        self._variance = (
+            float(reference['s1']) ** 2,
+            float(reference['sd'][tests.index(R2)]) ** 2 or 1.0,
+        )
+
+    def isolate(self, state: Any, abrupt: bool | None = None) -> Isolation | None:
+        """
+        Rank the faults after an alarm.
+
+        :param state: record of the monitor, with the alarm's onset.
+        :param abrupt: whether the fault came at once; by default from the test that fired.
+        :return: the ranking; None where there is no alarm or too short a record yet.
+        """
+        if not state['alarm']:
+            return None
+        window = self._window(state)
+        if len(window) < SHORTEST:
+            return None
+        if abrupt is None:
+            test = int(state['test'])
+            abrupt = test < len(TESTS) and TESTS[test].k0 >= 1.5
+        shown = self._inputs(state, window)
+        ranking = [self._fit(window, fault) for fault in HYPOTHESES]
+        if abrupt:
+            ranking = [
+                Hypothesis(h.fault, h.strength, h.cost + ABRUPT_PRIOR)
+                if h.fault in INCIPIENT_ONLY else h for h in ranking
+            ]  # fmt: skip
+        ranking.sort(key=lambda h: h.cost)
+        if shown:
+            best = ranking[0].cost
+            shown = [Hypothesis(h.fault, h.strength, best - 10.0 * EQUAL) for h in shown]
+        return Isolation(float(state['t']), len(window), (*shown, *ranking))
+
+    def _window(self, state: Any) -> NDArray:
+        count = int(state['samples'])
+        kept = min(count, HISTORY_LENGTH)
+        order = np.arange(count - kept, count) % HISTORY_LENGTH
+        window = state['history'][order]
+        window = window[window['t'] > state['t_onset']]
+        return np.ascontiguousarray(window[-WINDOW:])
+
+    def _inputs(self, state: Any, window: NDArray) -> list[Hypothesis]:
+        """Return f7 or f17 where the inputs themselves show them."""
+        fired = {
+            test.residual
+            for i, test in enumerate(TESTS)
+            if test.residual >= P1 and state['ratios'][i] >= 1.0
+        }
+        mean = dict(zip((test.residual for test in TESTS), self._ref['mu'], strict=True))
+        if T1 in fired:
+            shift = T_RANGE * float(np.nanmean(window['t1']) - mean[T1])
+            if shift > 0.0:
+                return [Hypothesis(7, min(max((shift - 200.0) / 100.0, 0.0), 1.0), 0.0)]
+        if P2 in fired and P1 not in fired:
+            return [Hypothesis(17, 1.0 - float(np.mean(window['p2'])) / mean[P2], 0.0)]
+        if P1 in fired:
+            return [Hypothesis(17, float(np.mean(window['p1'])) / mean[P1] - 1.0, 0.0)]
+        return []
+
+    def cost(self, window: NDArray, fault: int, strength: float) -> float:
+        """
+        Return the cost of one fault at one strength.
+
+        :param window: rows of `HISTORY`.
+        :param fault: number of the fault; strength as the benchmark defines it.
+        :return: nats.
+        """
+        faults = np.zeros(1, FAULTS)
+        faults[f'f{fault}'] = strength
+        n = len(window)
+        total = 0.0
+        stem = faults if fault in STEM_FAULTS else np.zeros(1, FAULTS)
+        error = _stem_error(window, self._act, stem[0], self._stem[0])
+        total += 0.5 * n * math.log(max(error, self._variance[R1], MINIMUM_ERROR))
+        flow = faults if fault in FLOW_FAULTS else np.zeros(1, FAULTS)
+        error = _flow_error(window, self._act, flow[0], self._ref['g0'], self._ref['g1'])
+        if not math.isnan(error):
+            total += 0.5 * n * math.log(max(error, self._variance[R2], MINIMUM_ERROR))
+        return total
+
+    def _fit(self, window: NDArray, fault: int) -> Hypothesis:
+        """Fit the strength by a coarse grid, then golden section between its neighbours."""
+        grid = [0.0, *GRID, 1.0]
+        if fault in TWO_SIDED:
+            grid = [*(-g for g in reversed(grid)), *grid[1:]]
+        if fault == 13:
+            grid = [g for g in grid if g > -0.7]  # X' stays positive
+        costs = [self.cost(window, fault, strength) for strength in grid]
+        i = min(range(len(grid)), key=costs.__getitem__)
+        low, high = grid[max(i - 1, 0)], grid[min(i + 1, len(grid) - 1)]
+        best = (costs[i], grid[i])
+        left, right = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
+        at_left = self.cost(window, fault, left)
+        at_right = self.cost(window, fault, right)
+        for _ in range(9):
+            best = min(best, (at_left, left), (at_right, right))
+            if at_left < at_right:
+                high, right, at_right = right, left, at_left
+                left = high - GOLDEN * (high - low)
+                at_left = self.cost(window, fault, left)
+            else:
+                low, left, at_left = left, right, at_right
+                right = low + GOLDEN * (high - low)
+                at_right = self.cost(window, fault, right)
+        best = min(best, (at_left, left), (at_right, right))
+        return Hypothesis(fault, best[1], best[0])

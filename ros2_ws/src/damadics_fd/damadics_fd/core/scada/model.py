@@ -1,0 +1,189 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Reduced stem model driven by 1 Hz samples: massless stem, Euler sub-steps of 5 ms.
+
+Chamber pressure and air mass are two states, integrated separately as in DABLib: p V / (m_a R T)
+is not conserved through the play there, and a model with one state would drift away from it.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from damadics_fd.core.jit import jit
+from damadics_fd.core.scada.actuator import P_RANGE, pressure_recovery
+
+SUB_STEPS = 7
+ATMOSPHERE = 101325.0
+GAS = 287.0 * 293.0
+MINIMUM_SUPPLY = 1.2e5
+
+STEM = np.dtype(
+    (
+        np.record,
+        [
+            ('tick', np.int64),  # next controller tick, counted from time 0
+            ('y1', np.float64),  # input filter
+            ('y2', np.float64),
+            ('p', np.float64),  # chamber pressure, Pa absolute
+            ('m_a', np.float64),  # air mass, kg
+            ('x', np.float64),  # stem before the play, m
+            ('X', np.float64),  # stem, m
+            ('feedback', np.float64),  # stem after the play of the feedback (f15), m
+        ],
+    )
+)
+
+STEM_FAULTS = (1, 2, 3, 4, 8, 9, 10, 11, 12, 13, 15, 16)
+FAULTS = np.dtype((np.record, [(f'f{number}', np.float64) for number in range(1, 20)]))
+
+
+@jit
+def start_stem(m: Any, act: Any, t: float) -> None:
+    """Set the rest state at time t, s: chamber empty, valve open (benchmark 1.4, 1.5)."""
+    m.tick = math.ceil(t / act.tick_s)
+    m.y1 = 0.0
+    m.y2 = 0.0
+    m.p = ATMOSPHERE
+    m.m_a = ATMOSPHERE * act.volume / GAS
+    m.x = 0.0
+    m.X = 0.0
+    m.feedback = 0.0
+
+
+@jit
+def copy_stem(source: Any, target: Any) -> None:
+    """Copy one stem state into another."""
+    target.tick = source.tick
+    target.y1 = source.y1
+    target.y2 = source.y2
+    target.p = source.p
+    target.m_a = source.m_a
+    target.x = source.x
+    target.X = source.X
+    target.feedback = source.feedback
+
+
+@jit
+def transducer(cvi: float) -> float:
+    """Return the output of the E/P transducer, a steep asymmetric curve with a quasi dead zone."""
+    if cvi <= -0.94:
+        return -0.55
+    if cvi < -0.54:
+        return -0.55 + 0.53 * (cvi + 0.94) / 0.40
+    if cvi < 0.46:
+        return -0.02 + 0.04 * (cvi + 0.54)
+    if cvi < 0.86:
+        return 0.02 + 0.98 * (cvi - 0.46) / 0.40
+    return 1.0
+
+
+@jit
+def advance_stem(
+    m: Any, act: Any, fault: Any,
+    t0: float, t1: float, cv0: float, cv1: float,
+    dp0: float, dp1: float, slope0: float, slope1: float,
+) -> float:  # fmt: skip
+    """
+    Advance the stem from t0 to t1 and return its measured position, 0..1.
+
+    The valve's pressure drop is a cubic Hermite between the samples, CV a straight line; hand
+    over cv1 = cv0 for a CV that is held.
+
+    :param m: record of `STEM`, changed in place.
+    :param act: record of `Actuator`.
+    :param fault: record of `FAULTS` (table 2.1); zeros for the nominal model.
+    :param t0: time of the previous sample, s.
+    :param t1: time of this sample, s.
+    :param cv0: CV at t0; cv1 at t1.
+    :param dp0: pressure drop at t0, share of 4 MPa; dp1 at t1.
+    :param slope0: its slope at t0, 1/s; slope1 at t1.
+    :return: X', the position a sensor shows.
+    """
+    dt = t1 - t0
+    lag = math.exp(-act.tick_s / act.filter_s)
+    h = act.tick_s / SUB_STEPS
+    stroke = act.stroke
+    area = act.area * (1.0 - fault.f10)
+    spring = act.spring * (1.0 - fault.f11)
+    supply = act.supply * (1.0 - fault.f16)
+    if supply < MINIMUM_SUPPLY:
+        supply = 0.0
+    top = stroke * (1.0 - fault.f1) * (1.0 - 0.2 * fault.f2) * (1.0 + 0.1 * fault.f3)
+    offset = 0.2 * fault.f2 - 0.1 * fault.f3
+    play0 = min(max(stroke * (act.play + fault.f4), 0.0), stroke)
+    leak = 0.2e-6 * (fault.f9 + fault.f10)
+    sensor = 1.0 + 1.25 * fault.f13
+    half_feedback = 0.5 * fault.f15 * stroke
+    y1 = m.y1
+    y2 = m.y2
+    p = m.p
+    m_a = m.m_a
+    x = m.x
+    X = m.X
+    feedback = m.feedback
+    tick = m.tick
+    while tick * act.tick_s < t1:
+        a = (tick * act.tick_s - t0 + 0.5 * act.tick_s) / dt
+        u = min(max(cv0 + (cv1 - cv0) * a, 0.0), 1.024)
+        b = 1.0 - a
+        drop = (
+            (1.0 + 2.0 * a) * b * b * dp0
+            + a * b * b * dt * slope0
+            + a * a * (3.0 - 2.0 * a) * dp1
+            - a * a * b * dt * slope1
+        )
+        thrust = P_RANGE * drop * act.plug_area
+        # positioner: P controller on the filtered command, E/P transducer
+        shown = X
+        if fault.f13 != 0.0:
+            shown = min(max(X * sensor, -0.25 * stroke), 1.25 * stroke)
+        feedback = min(max(feedback, shown - half_feedback), shown + half_feedback)
+        angle = (min(max(feedback, -0.01), 0.05) - 0.5 * stroke) / act.lever
+        pv = 0.5 + math.asin(min(max(angle, -1.0), 1.0)) * 3.0 / math.pi
+        e = transducer(min(max(act.gain * (y2 - pv), -1.0), 1.0)) * (1.0 - fault.f12)
+        e = min(max(e, -1.0), 1.0)
+        source = supply if e > 0.0 else 0.0
+        flow = act.beta * abs(e)
+        for _ in range(SUB_STEPS):
+            gauge = p - ATMOSPHERE
+            volume = act.volume + area * X
+            delta = source - gauge
+            md = flow * math.copysign(math.sqrt(abs(delta)), delta)
+            if leak > 0.0:
+                md -= leak * math.copysign(math.sqrt(abs(gauge)), gauge)
+            plug = thrust / pressure_recovery(X / stroke + offset)
+            force = act.weight + area * gauge - plug - spring * (X + act.compression)
+            if (force <= 0.0 and X <= 0.0) or (force > 0.0 and top <= X):
+                force = 0.0
+            v = force / act.viscous
+            x = min(max(x + h * v, -0.05 * stroke), 1.25 * stroke)
+            half = 0.5 * play0
+            if fault.f8 != 0.0:
+                half *= 1.0 + 0.5 * fault.f8 * (1.0 - X / stroke)
+            if v > 0.0:
+                X = max(X, x - half)
+            elif v < 0.0:
+                X = min(X, x + half)
+            X = min(max(X, 0.0), top)
+            speed = min(max(v, -0.02), 0.02)
+            p += h * p / volume * (md * volume / m_a - area * speed)
+            p = min(max(p, 0.0), 7.0e5)
+            m_a = min(max(m_a + h * md, 1e-9), 0.1)
+        y1_next = u - (u - y1) * lag
+        mean = 0.5 * (y1 + y1_next)
+        y2 = mean - (mean - y2) * lag
+        y1 = y1_next
+        tick += 1
+    m.tick = tick
+    m.y1 = y1
+    m.y2 = y2
+    m.p = p
+    m.m_a = m_a
+    m.x = x
+    m.X = X
+    m.feedback = feedback
+    shown_x: float = min(max(X / stroke * sensor, 0.0), 1.0)
+    return shown_x

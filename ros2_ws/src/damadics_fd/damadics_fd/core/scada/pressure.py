@@ -1,0 +1,78 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Pressure filter: a learned linear predictor, fused with the noisy measurement."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from damadics_fd.core.jit import jit
+
+TAPS = 20
+SHORT_TAPS = 12
+SHORT_RECORD = 1000
+GATE = 7.0  # multiples of the predictor's sigma beyond which the measurement is believed
+
+PRESSURE = np.dtype(
+    (
+        np.record,
+        [
+            ('a', np.float64, (TAPS,)),  # predictor, sum a_i = 1
+            ('c', np.float64),  # weight of the measurement
+            ('sigma', np.float64),  # of the prediction error
+        ],
+    )
+)
+
+
+@jit
+def predict_pressure(filt: Any, past: np.ndarray) -> Any:
+    """Return sum a_i P'(k-i); `past` holds the newest raw sample first."""
+    total = 0.0
+    for i in range(TAPS):
+        total += filt.a[i] * past[i]
+    return total
+
+
+@jit
+def fuse_pressure(filt: Any, past: np.ndarray, measured: float) -> float:
+    """Return P^(k) = c P'(k) + (1-c) pr(k), or P'(k) itself where it jumped."""
+    predicted = predict_pressure(filt, past)
+    if abs(measured - predicted) > GATE * filt.sigma:
+        return measured
+    return filt.c * measured + (1.0 - filt.c) * predicted
+
+
+@jit
+def push(past: np.ndarray, value: float) -> None:
+    """Put the newest value in front of the ring of past samples."""
+    for i in range(TAPS - 1, 0, -1):
+        past[i] = past[i - 1]
+    past[0] = value
+
+
+def learn_pressure(pressure: NDArray[np.float64], sigma: float, filt: NDArray) -> None:
+    """
+    Fit the predictor by ridge least squares and the fusion weight from its error.
+
+    :param pressure: fault-free pressure, share of full scale, shape (n,).
+    :param sigma: standard deviation of the sensor noise, share of full scale.
+    :param filt: structured array of `PRESSURE`, written in place.
+    """
+    n = pressure.size
+    taps = TAPS if n >= SHORT_RECORD else SHORT_TAPS
+    lagged = np.column_stack([pressure[taps - i : n - i] for i in range(1, taps + 1)])
+    newest = lagged[:, :1]
+    design = lagged[:, 1:] - newest
+    target = pressure[taps:] - newest[:, 0]
+    ridge = 0.05 * target.size * sigma**2 * np.eye(taps - 1)
+    weights = np.linalg.solve(design.T @ design + ridge, design.T @ target)
+    error = target - design @ weights
+    variance = max(float(error.var()) - sigma**2, 0.02 * sigma**2)
+    a = np.zeros(TAPS)
+    a[1:taps] = weights
+    a[0] = 1.0 - weights.sum()
+    filt['a'] = a
+    filt['c'] = variance / (variance + sigma**2)
+    filt['sigma'] = error.std()

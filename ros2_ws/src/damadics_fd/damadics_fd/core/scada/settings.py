@@ -1,0 +1,83 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Settings of the SCADA-rate monitor."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from damadics_fd.core.scada.actuator import ACTUATOR, Actuator
+
+
+@dataclass(frozen=True)
+class ScadaSettings:
+    """
+    What a user states; everything else is learned from the fault-free record.
+
+    :param period_s: sample period the monitor works at; faster input is thinned to it.
+    :param t_on_s: no test before this time since the first sample.
+    :param learn_from_s: start of the learning record since the first sample.
+    :param learn_s: end of it; without a given reference monitoring starts there.
+    :param days_per_false_alarm: false-alarm budget of the whole bank.
+    :param sigma: standard deviation of the sensor noise, share of full scale.
+    :param wide_play: play of the second model of the friction test, share of stroke.
+    :param gap_s: longest gap the models are carried over; a longer one restarts them.
+    :param settle_s: no test for this time after such a restart.
+    :param saturated: F' and f beyond which the flow meter shows no more (two limits).
+    :param actuator: nominal parameters.
+    """
+
+    period_s: float = 1.0
+    t_on_s: float = 300.0
+    learn_from_s: float = 60.0
+    learn_s: float = 3600.0
+    days_per_false_alarm: float = 30.0
+    sigma: float = 0.001414
+    wide_play: float = 0.03
+    gap_s: float = 30.0
+    settle_s: float = 120.0
+    saturated: tuple[float, float] = (0.97, 0.985)
+    actuator: Actuator = field(default_factory=Actuator)
+
+    def __post_init__(self) -> None:
+        """Refuse values that make no monitor, all of them in one message."""
+        wrong = [
+            f'{name} is {value}: give more than {low:g}'
+            for name, value, low in (
+                ('period_s', self.period_s, 0.0),
+                ('learn_s', self.learn_s, self.learn_from_s + 239.0),
+                ('days_per_false_alarm', self.days_per_false_alarm, 0.0),
+                ('sigma', self.sigma, 0.0),
+                ('wide_play', self.wide_play, self.actuator.play),
+            )
+            if not value > low
+        ]
+        if wrong:
+            raise ValueError('; '.join(wrong))
+
+    def record(self) -> np.ndarray:
+        """Return what the compiled step reads, as a structured array of length 1."""
+        values = np.zeros(1, SETTINGS)
+        values['act'] = self.actuator.record()
+        for name in ('period_s', 't_on_s', 'sigma', 'wide_play', 'gap_s', 'settle_s'):
+            values[name] = getattr(self, name)
+        values['flow_high'], values['model_high'] = self.saturated
+        return values
+
+
+SETTINGS = np.dtype(
+    (
+        np.record,
+        [
+            ('act', ACTUATOR),
+            ('period_s', np.float64),
+            ('t_on_s', np.float64),
+            ('sigma', np.float64),
+            ('wide_play', np.float64),
+            ('gap_s', np.float64),
+            ('settle_s', np.float64),
+            ('flow_high', np.float64),
+            ('model_high', np.float64),
+        ],
+    )
+)
