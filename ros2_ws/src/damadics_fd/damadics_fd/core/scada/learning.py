@@ -173,7 +173,7 @@ def _bias(phi: Floats, error: Floats, used: int) -> tuple[Floats, Floats]:
     design = phi[:, :used]
     ridge = RIDGE * len(error) * np.eye(used)
     ridge[0, 0] = 0.0
-    w: Floats = np.linalg.solve(design.T @ design + ridge, design.T @ error)
+    w = np.asarray(np.linalg.solve(design.T @ design + ridge, design.T @ error), np.float64)
     left: Floats = error - design @ w
     return w, left
 

@@ -65,7 +65,7 @@ def scada_samples(columns: Mapping[str, NDArray]) -> Floats:
     n = len(columns['stamp'])
     missing = np.full(n, np.nan)
     return np.column_stack([
-        columns['stamp'] * 1e-9, columns['cv'], columns['x1'],
+        columns['stamp'] / 1e9, columns['cv'], columns['x1'],
         columns['p1'] / P_RANGE, columns['p2'] / P_RANGE,
         columns.get('t1', missing) / T_RANGE,
         columns.get('flow', missing) * (TPH_PER_KGS / F_RANGE),

@@ -36,7 +36,7 @@ def predict_pressure(filt: Any, past: np.ndarray) -> Any:
 
 
 @jit
-def fuse_pressure(filt: Any, past: np.ndarray, measured: float) -> float:
+def fuse_pressure(filt: Any, past: np.ndarray, measured: float) -> Any:
     """Return P^(k) = c P'(k) + (1-c) pr(k), or P'(k) itself where it jumped."""
     predicted = predict_pressure(filt, past)
     if abs(measured - predicted) > GATE * filt.sigma:

@@ -247,7 +247,9 @@ def residuals(
     for i in range(N_WEIGHTS):
         correction += ref.w[i] * s.phi[i]
     s.residual[R1] = x - s.xm[0] - correction
-    s.residual[R2] = 0.0 if s.masked else (flow - ref.g0 - ref.g1 * s.f) / s.sq
+    s.residual[R2] = (flow - ref.g0 - ref.g1 * s.f) / s.sq  # NaN where not measured
+    if s.masked and not math.isnan(s.f):
+        s.residual[R2] = 0.0
     s.residual[P1] = p1
     s.residual[P2] = p2
     s.residual[T1] = t1

@@ -43,7 +43,7 @@ class Adwin(FirResidual):
 
     name, title = 'adwin', 'ADWIN (river)'
 
-    def __init__(self, decades: tuple[int, ...] = (2, 3, 4, 6, 8, 12, 16, 24, 32)) -> None:
+    def __init__(self, decades: tuple[int, ...] = (4, 8, 16, 32, 64, 128, 192, 256, 300)) -> None:
         self.decades = decades
 
     def _test(self, z: Floats) -> Floats:

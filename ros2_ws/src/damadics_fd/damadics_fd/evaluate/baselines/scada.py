@@ -2,17 +2,28 @@
 # SPDX-License-Identifier: Apache-2.0
 """The SCADA-rate monitor as a detector of a campaign, and its residuals with plain tests."""
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from damadics_fd.core.scada.cusum import TEST_NAMES
 from damadics_fd.core.scada.isolation import Isolation, Isolator
 from damadics_fd.core.scada.learning import learn
 from damadics_fd.core.scada.monitor import ScadaMonitor
 from damadics_fd.core.scada.settings import ScadaSettings
-from damadics_fd.evaluate.baselines.base import Detector, Floats
+from damadics_fd.core.scada.step import HISTORY_LENGTH
+from damadics_fd.evaluate.baselines.base import P1, P2, T1, Detector, Floats
+
+SIGNATURE = ('m1', 'g1', 'd1', 'rms1', 'm2', 'g2', 'rms2', 'dP1', 'dP2', 'dT1')
+SIGNATURE_S = 600
+
+
+def _regress(values: Floats, *regressors: Floats) -> Floats:
+    design = np.column_stack([np.ones(len(values)), *regressors])
+    return np.asarray(np.linalg.lstsq(design, values, rcond=None)[0])
 
 
 class Scada(Detector):
@@ -28,6 +39,9 @@ class Scada(Detector):
     def fit(self, hour: Floats) -> None:
         """Learn the reference."""
         self.monitor = ScadaMonitor(self._settings, learn(hour, self._settings))
+        rows = self.learning_rows(hour)
+        inputs = (('p1', P1), ('p2', P2), ('t1', T1))
+        self._mean = {name: float(np.nanmean(rows[:, column])) for name, column in inputs}
 
     def trace(self, samples: Floats) -> NDArray:
         """Return the monitor's trace over a run that starts at rest."""
@@ -38,11 +52,56 @@ class Scada(Detector):
         """Return the largest statistic over its limit."""
         return np.asarray(self.trace(samples)['ratio'])
 
-    def isolate(self) -> Isolation | None:
-        """Return the ranking of faults after the last run, None without an alarm."""
-        monitor = self.monitor
-        assert monitor.reference is not None, 'fit first'
-        return Isolator(self._settings.record()[0], monitor.reference[0]).isolate(monitor.state)
+    def alarm_time(self) -> float | None:
+        """Return when the last run raised the alarm, s."""
+        state = self.monitor.state
+        return float(state.t_alarm) if state.alarm else None
+
+    def first_test(self) -> str | None:
+        """Return the test that raised the alarm of the last run."""
+        state = self.monitor.state
+        return TEST_NAMES[int(state.test)] if state.alarm else None
+
+    def signature(self) -> dict[str, float]:
+        """
+        Return how the residuals and inputs of the last 600 s differ from the learned ones.
+
+        :return: m1, g1, d1, rms1 of r1 (mean, gain with the model's position, share of the
+            stroke's direction), m2, g2, rms2 of F' - f, and the shifts of P1', P2', T1'.
+        """
+        state = self.monitor.state
+        kept = min(int(state.samples), SIGNATURE_S)
+        rows = state.history[np.arange(state.samples - kept, state.samples) % HISTORY_LENGTH]
+        direction = np.sign(rows['cv'] - rows['cv0'])
+        position = (rows['xm'] - 0.5) / 0.18
+        m1, g1, d1 = _regress(rows['r1'], position, direction)
+        flow = np.nan_to_num(rows['flow'] - rows['f'])
+        m2, g2 = _regress(flow, np.nan_to_num(rows['f'] - 0.6))
+        shift = [np.nanmean(rows[name]) - self._mean[name] for name in ('p1', 'p2', 't1')]
+        values = (m1, g1, d1, rows['r1'].std(), m2, g2, flow.std(), *shift)
+        return dict(zip(SIGNATURE, (round(float(v), 6) for v in values), strict=True))
+
+    def isolate_at(self, samples: Floats, times: Sequence[float]) -> list[Isolation]:
+        """
+        Run again and isolate at given times.
+
+        :param samples: rows of a run.
+        :param times: ascending, s.
+        :return: one isolation per time at which the record sufficed.
+        """
+        self.monitor.reset()
+        assert self.monitor.reference is not None, 'fit first'
+        isolator = Isolator(self._settings.record()[0], self.monitor.reference[0])
+        found = []
+        done = 0
+        for time in times:
+            until = int(np.searchsorted(samples[:, 0], time, side='right'))
+            self.monitor.run_samples(samples[done:until])
+            done = until
+            isolation = isolator.isolate(self.monitor.state)
+            if isolation is not None:
+                found.append(isolation)
+        return found
 
     def settings(self) -> dict[str, Any]:
         """Return the settings of the monitor."""
