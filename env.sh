@@ -27,7 +27,6 @@ _damadics_env() {
     esac
     export LD_LIBRARY_PATH AMENT_PREFIX_PATH
     export _ROS_WHEELS_BOOTSTRAP_COMPLETE=1  # the libraries are on the path: no second start
-    export ROS_DISTRO=jazzy ROS_VERSION=2 ROS_PYTHON_VERSION=3
   fi
   if ! command -v ros2 >/dev/null 2>&1; then
     export PATH="$root/tools/bin:$PATH"

@@ -1,0 +1,178 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Start the project's nodes as processes and end them again."""
+
+import os
+import random
+import signal
+import socket
+import subprocess
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+
+from ament_index_python.packages import PackageNotFoundError, get_package_prefix
+
+
+class ProcessError(Exception):
+    """A node could not be started or ended badly; the message says which and shows its output."""
+
+
+def free_domain() -> int:
+    """
+    Find a ROS domain that nobody uses on this machine.
+
+    :return: a number from 1 to 99.
+    :raises ProcessError: where all are in use.
+    """
+    domains = list(range(1, 100))
+    random.SystemRandom().shuffle(domains)
+    for domain in domains:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as discovery:
+            try:
+                discovery.bind(('', 7400 + 250 * domain))  # RTPS 2.5, 9.6.2.3: its discovery port
+            except OSError:
+                continue
+        return domain
+    raise ProcessError('every ROS domain from 1 to 99 is in use on this machine: end some nodes')
+
+
+def surroundings(domain: int) -> dict[str, str]:
+    """
+    Return the environment that keeps a run to itself.
+
+    :param domain: its ROS domain.
+    :return: variables for every process of the run.
+    """
+    return {'ROS_DOMAIN_ID': str(domain), 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
+
+
+def executable(package: str, name: str) -> str:
+    """
+    Find a node's executable as `ros2 run` does.
+
+    :param package: name of the ROS package.
+    :param name: name of the executable.
+    :return: its path.
+    :raises ProcessError: where it is not installed.
+    """
+    try:
+        path = Path(get_package_prefix(package), 'lib', package, name)
+    except PackageNotFoundError:
+        path = None
+    if path is None or not path.is_file():
+        raise ProcessError(
+            f'{package} {name} is not installed: run make build, then source env.sh'
+        )
+    return str(path)
+
+
+def parameters(**values: object) -> list[str]:
+    """
+    Write parameters as a node's command line takes them.
+
+    :param values: parameters by name.
+    :return: the arguments.
+
+    >>> parameters(rate=400.0, noise=False)
+    ['--ros-args', '-p', 'rate:=400.0', '-p', 'noise:=false']
+    """
+    words = ['--ros-args']
+    for name, value in values.items():
+        text = str(value).lower() if isinstance(value, bool) else str(value)
+        words += ['-p', f'{name}:={text}']
+    return words
+
+
+class Processes:
+    """
+    The processes of one run; leaving the context ends what still runs.
+
+    :param logs: folder for the output of each process.
+    :param environment: variables added to this process's own.
+    """
+
+    def __init__(self, logs: Path, environment: dict[str, str] | None = None) -> None:
+        self._logs = logs
+        self._environment = {**os.environ, **(environment or {})}
+        self._running: dict[str, subprocess.Popen[bytes]] = {}
+
+    def __enter__(self) -> 'Processes':
+        """Make the folder for the logs."""
+        self._logs.mkdir(parents=True, exist_ok=True)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        problem: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """End what still runs."""
+        for process in self._running.values():
+            if process.poll() is None:
+                process.send_signal(signal.SIGINT)
+        for process in self._running.values():
+            try:
+                process.wait(5.0)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+
+    def start(self, package: str, name: str, arguments: Sequence[str] = ()) -> None:
+        """
+        Start an executable.
+
+        :param package: name of its ROS package.
+        :param name: its name, by which it is known here.
+        :param arguments: its command line.
+        """
+        with self.log(name).open('wb') as log:
+            self._running[name] = subprocess.Popen(
+                [executable(package, name), *arguments],
+                stdout=log, stderr=subprocess.STDOUT, env=self._environment,
+            )
+
+    def log(self, name: str) -> Path:
+        """Return the file with the output of a process."""
+        return self._logs / f'{name}.log'
+
+    def ended(self, name: str) -> bool:
+        """Tell whether a process has ended."""
+        return self._running[name].poll() is not None
+
+    def check(self) -> None:
+        """
+        Make sure that nothing has failed so far.
+
+        :raises ProcessError: where a process has ended with an error.
+        """
+        for name, process in self._running.items():
+            if process.poll():
+                raise ProcessError(
+                    f'{name} ended with exit code {process.returncode}:\n{self._tail(name)}'
+                )
+
+    def end(self, name: str, patience: float = 20.0) -> None:
+        """
+        End a process with SIGINT and wait for it.
+
+        :param name: name of the process.
+        :param patience: time it may take [s].
+        :raises ProcessError: where it does not end, or not with exit code 0.
+        """
+        process = self._running[name]
+        if process.poll() is None:
+            process.send_signal(signal.SIGINT)
+        deadline = time.monotonic() + patience
+        while process.poll() is None and time.monotonic() < deadline:
+            time.sleep(0.01)
+        if process.poll() is None:
+            process.kill()
+            raise ProcessError(f'{name} did not end within {patience:g} s:\n{self._tail(name)}')
+        self.check()
+
+    def _tail(self, name: str, lines: int = 15) -> str:
+        text = self.log(name).read_text(errors='replace').splitlines()
+        return '\n'.join(f'  {line}' for line in text[-lines:])

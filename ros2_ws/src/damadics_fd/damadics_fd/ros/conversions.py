@@ -1,0 +1,108 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Convert between messages and the core's tuples; the only place that knows both."""
+
+from builtin_interfaces.msg import Time
+from damadics_msgs.msg import Estimate as EstimateMessage
+from damadics_msgs.msg import FaultEvent, FaultFlag, Measurement
+
+from damadics_fd.core.detector import Decision
+from damadics_fd.core.estimator import Estimate
+from damadics_fd.core.events import Event
+
+NANO = 1_000_000_000
+MEASURED = ('cv', 'x1', 'p1', 'p2', 't1', 'flow', 'ps')
+SCALARS = tuple(
+    name for name in Estimate._fields if name not in ('stamp', 'alpha1', 'alpha4', 'alpha5')
+)
+
+
+def nanoseconds(time: Time) -> int:
+    """
+    Return a stamp as the core takes it.
+
+    :param time: stamp of a message.
+    :return: the stamp [ns].
+    """
+    return time.sec * NANO + time.nanosec
+
+
+def set_stamp(time: Time, stamp: int) -> None:
+    """
+    Write a stamp of the core into a message.
+
+    :param time: stamp of a message, written.
+    :param stamp: the stamp [ns].
+    """
+    time.sec, time.nanosec = divmod(stamp, NANO)
+
+
+def sample(message: Measurement) -> tuple[int, float, float, float, float, float, float, float]:
+    """
+    Return a measurement as `Estimator.update` takes it.
+
+    :param message: the measurement.
+    :return: stamp [ns], cv, x1, p1, p2, t1, flow, ps.
+    """
+    m = message
+    return nanoseconds(m.header.stamp), m.cv, m.x1, m.p1, m.p2, m.t1, m.flow, m.ps
+
+
+def write_estimate(estimate: Estimate, message: EstimateMessage) -> None:
+    """
+    Write an estimate into its message.
+
+    :param estimate: the estimate.
+    :param message: written, but for `frame_id`.
+    """
+    set_stamp(message.header.stamp, estimate.stamp)
+    message.alpha_hat = estimate.alpha_hat
+    for name in SCALARS:
+        setattr(message, name, getattr(estimate, name))
+
+
+def read_estimate(message: EstimateMessage) -> Estimate:
+    """
+    Return an estimate out of its message.
+
+    :param message: the message.
+    :return: what the estimator node had.
+    """
+    alpha1, alpha4, alpha5 = message.alpha_hat.tolist()
+    return Estimate(
+        stamp=nanoseconds(message.header.stamp), alpha1=alpha1, alpha4=alpha4, alpha5=alpha5,
+        **{name: getattr(message, name) for name in SCALARS},
+    )
+
+
+def write_flag(decision: Decision, message: FaultFlag) -> None:
+    """
+    Write a decision into a fault flag.
+
+    :param decision: the decision.
+    :param message: written, but for `frame_id`.
+    """
+    set_stamp(message.header.stamp, decision.stamp)
+    set_stamp(message.since, decision.since)
+    set_stamp(message.onset, decision.onset)
+    message.fault, message.state = decision.fault, decision.state
+    message.level, message.occurrence = decision.level, decision.occurrence
+    message.residual, message.threshold = decision.residual, decision.threshold
+
+
+def event_message(event: Event, frame_id: str) -> FaultEvent:
+    """
+    Return the message of an event.
+
+    :param event: a transition of the alarm.
+    :param frame_id: tag of the actuator.
+    :return: the message.
+    """
+    message = FaultEvent()
+    message.header.frame_id = frame_id
+    set_stamp(message.header.stamp, event.stamp)
+    set_stamp(message.onset, event.onset)
+    for name in ('transition', 'occurrence', 'level', 'residual', 'threshold', 'ratio', 'duration',
+                 'cause', 'confidence', 'strength', 'text', 'advice'):
+        setattr(message, name, getattr(event, name))
+    return message

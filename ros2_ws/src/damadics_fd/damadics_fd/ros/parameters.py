@@ -1,0 +1,139 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Declare a node's parameters so that all mistakes in them are reported together."""
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+from typing import Any
+
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
+from rclpy.node import Node
+
+from damadics_fd.core.modes import MODES
+from damadics_fd.core.settings import Settings, SettingsError
+from damadics_fd.ros.spin import StartError
+
+DEFAULT_MODE = 'paper'
+OF_EVERY_NODE = ('use_sim_time', 'start_type_description_service', 'qos_overrides.')
+
+
+class Parameters:
+    """
+    Declare parameters, collect what is wrong with them and refuse them together.
+
+    :param node: the node that has the parameters.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._problems: list[str] = []
+        self._names: list[str] = []
+
+    def declare(
+        self,
+        name: str,
+        default: Any,
+        description: str,
+        *,
+        limits: tuple[float, float] | None = None,
+        allowed: Iterable[str] = (),
+    ) -> Any:
+        """
+        Declare one read-only parameter.
+
+        :param name: name of the parameter.
+        :param default: value where none is given; its type is the parameter's type.
+        :param description: one line for people, with the unit.
+        :param limits: least and greatest value.
+        :param allowed: the values of a text parameter.
+        :return: the value; the default where the given one is refused.
+        """
+        self._names.append(name)
+        allowed = tuple(allowed)
+        descriptor = ParameterDescriptor(description=description, read_only=True)
+        if allowed:
+            descriptor.additional_constraints = 'one of: ' + ', '.join(allowed)
+        if limits and isinstance(default, float):
+            descriptor.floating_point_range = [
+                FloatingPointRange(from_value=float(limits[0]), to_value=float(limits[1]))
+            ]
+        elif limits:
+            descriptor.integer_range = [
+                IntegerRange(from_value=int(limits[0]), to_value=int(limits[1]))
+            ]
+        try:
+            value = self._node.declare_parameter(name, default, descriptor).value
+        except InvalidParameterTypeException:
+            given = self._given()[name].value
+            kind = 'a number with a decimal point' if isinstance(default, float) else (
+                f'of type {type(default).__name__}'
+            )
+            self._refuse(name, f'{given!r} is not {kind}', description)
+            return default
+        except InvalidParameterValueException:
+            low, high = limits or ('?', '?')
+            given = self._given()[name].value
+            self._refuse(name, f'{given!r} is not within {low} .. {high}', description)
+            return default
+        if allowed and value not in allowed:
+            self._refuse(name, f'{value!r} is not one of {", ".join(allowed)}', description)
+            return default
+        return value
+
+    def check(self, *more: str) -> None:
+        """
+        Refuse the parameters if anything is wrong with them; call it after the last declaration.
+
+        :param more: further mistakes that the node has found.
+        :raises StartError: listing every mistake, a line each.
+        """
+        for name in self._given():
+            if name in self._names or name.startswith(OF_EVERY_NODE):
+                continue
+            near = get_close_matches(name, self._names, 1)
+            hint = f': do you mean {near[0]}?' if near else ''
+            self._problems.append(f'{name}: there is no such parameter{hint}')
+        problems = [*self._problems, *more]
+        if problems:
+            name = self._node.get_name()
+            raise StartError('\n  '.join([f'{name} does not start, its parameters:', *problems]))
+
+    def _refuse(self, name: str, cause: str, description: str) -> None:
+        self._problems.append(f'{name}: {cause} ({description})')
+
+    def _given(self) -> dict[str, Any]:
+        # rclpy has no public view of the overrides of parameters that are not declared
+        return self._node._parameter_overrides
+
+
+def declare_settings(parameters: Parameters) -> Settings:
+    """
+    Declare every setting of the core as a parameter and read them.
+
+    :param parameters: of the node, with its other parameters declared.
+    :return: the settings.
+    :raises StartError: listing every mistake in the node's parameters.
+    """
+    mode = parameters.declare('mode', DEFAULT_MODE, 'how the approximator is run', allowed=MODES)
+    values = {}
+    for entry in Settings.describe(mode):
+        if entry['name'] == 'mode':
+            continue
+        unit = f' [{entry["unit"]}]' if entry['unit'] else ''
+        default = entry['default']
+        values[entry['name']] = parameters.declare(
+            entry['name'],
+            list(default) if isinstance(default, tuple) else default,
+            entry['description'] + unit,
+            limits=(entry['low'], entry['high']) if type(default) in (int, float) else None,
+            allowed=entry.get('choices', ()),
+        )
+    problems: list[str] = []
+    settings = Settings.for_mode(mode)
+    try:
+        settings = Settings.from_mapping({'mode': mode, **values})
+    except SettingsError as error:
+        problems = error.problems
+    parameters.check(*problems)
+    return settings

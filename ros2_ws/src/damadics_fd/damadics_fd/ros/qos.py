@@ -1,0 +1,43 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""The qualities of service of the public topics; see docs/architecture.md."""
+
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+
+SECONDS_HELD = 2.0
+LEAST_DEPTH = 1000
+
+
+def samples(rate: float = 0.0) -> QoSProfile:
+    """
+    Return the profile of a topic that carries samples: reliable, volatile.
+
+    :param rate: samples per second of wall time; the queue holds two seconds of them.
+    :return: the profile.
+    """
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=max(LEAST_DEPTH, int(SECONDS_HELD * rate) + 1),
+        reliability=ReliabilityPolicy.RELIABLE,
+        durability=DurabilityPolicy.VOLATILE,
+    )
+
+
+def latched(depth: int) -> QoSProfile:
+    """
+    Return the profile of a topic whose last messages a late subscriber gets at once.
+
+    :param depth: number of messages kept for late subscribers.
+    :return: the profile.
+    """
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=depth,
+        reliability=ReliabilityPolicy.RELIABLE,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL,
+    )
+
+
+FLAG = latched(1)
+EVENTS = latched(100)
+DIAGNOSTICS = QoSProfile(depth=10)

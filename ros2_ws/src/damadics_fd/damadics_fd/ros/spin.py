@@ -1,0 +1,55 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Start a node, spin it until it has finished or a signal comes, and end it cleanly."""
+
+import sys
+from collections.abc import Callable
+from typing import Protocol
+
+import rclpy
+from rclpy.executors import ExternalShutdownException
+from rclpy.experimental import EventsExecutor
+
+
+class SpinnableNode(Protocol):
+    """What `spin` needs of a node."""
+
+    finished: bool
+
+    def destroy_node(self) -> None:
+        """Release what the node holds."""
+
+
+class StartError(Exception):
+    """A node refuses to start; the message names every cause and its remedy."""
+
+
+def spin(make_node: Callable[[], SpinnableNode], args: list[str] | None = None) -> int:
+    """
+    Run one node as a process does.
+
+    :param make_node: makes the node; may raise `StartError`.
+    :param args: command line, `sys.argv` by default.
+    :return: the exit code: 0 after SIGINT, SIGTERM or the end of the node's work, 1 where the
+        node did not start.
+    """
+    rclpy.init(args=args)
+    try:
+        node = make_node()
+    except StartError as problem:
+        print(problem, file=sys.stderr)
+        rclpy.try_shutdown()
+        return 1
+    executor = EventsExecutor()
+    executor.add_node(node)
+    try:
+        # Never untimed: an untimed spin of this executor does not return in some builds.
+        while rclpy.ok() and not node.finished:
+            executor.spin_once(timeout_sec=0.1)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        node.destroy_node()
+        executor.shutdown()
+        rclpy.try_shutdown()
+    return 0
