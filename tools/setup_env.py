@@ -5,12 +5,13 @@
 Make the virtual environment `.venv` in which DAMADICS FD is built and run.
 
 Where ROS 2 Jazzy is installed, `.venv` sees its packages and gets only what it lacks; elsewhere
-ROS 2 Jazzy comes from wheels. Doing it again costs nothing: a stamp in `.venv` tells what is there.
+ROS 2 Jazzy comes from wheels. Doing it again costs nothing: a stamp in `.venv` tells what is in.
 """
 
 import hashlib
 import os
 import platform
+import re
 import shutil
 import subprocess
 import sys
@@ -27,7 +28,7 @@ UV = 'uv==0.13.9'
 PYTHONS = ((3, 11), (3, 13))
 
 
-class Unsupported(Exception):
+class UnsupportedError(Exception):
     """This machine cannot run the project as it is; the message says what to do."""
 
 
@@ -36,11 +37,11 @@ def installed_ros() -> bool:
     Tell whether an installed ROS 2 Jazzy is to be used.
 
     :return: True where ROS 2 Jazzy is sourced or installed in its usual place.
-    :raises Unsupported: where another distribution of ROS is sourced.
+    :raises UnsupportedError: where another distribution of ROS is sourced.
     """
     distribution = os.environ.get('ROS_DISTRO')
     if distribution and distribution != 'jazzy':
-        raise Unsupported(
+        raise UnsupportedError(
             f'ROS {distribution} is sourced, but DAMADICS FD needs Jazzy: open a shell without it '
             'or source /opt/ros/jazzy/setup.bash.'
         )
@@ -52,37 +53,37 @@ def check_machine(ros_installed: bool) -> None:
     Refuse a machine on which the installation cannot succeed.
 
     :param ros_installed: an installed ROS 2 is used, so no wheels of it are needed.
-    :raises Unsupported: with the cause and the remedy in one sentence.
+    :raises UnsupportedError: with the cause and the remedy in one sentence.
     """
     version = '.'.join(map(str, sys.version_info[:2]))
     lowest, highest = ('.'.join(map(str, v)) for v in PYTHONS)
     if not PYTHONS[0] <= sys.version_info[:2] <= PYTHONS[1]:
-        raise Unsupported(
+        raise UnsupportedError(
             f'Python {version} is not supported: run make PYTHON=python3.12 with a Python from '
             f'{lowest} to {highest}.'
         )
     if not ros_installed:
         machine, system = platform.machine(), platform.system()
         if (system, machine) != ('Linux', 'x86_64'):
-            raise Unsupported(
+            raise UnsupportedError(
                 f'There are no ROS 2 wheels for {system} on {machine}: install ROS 2 Jazzy and '
                 'source /opt/ros/jazzy/setup.bash, then run make again.'
             )
         library, release = platform.libc_ver()
         if library != 'glibc' or tuple(map(int, release.split('.')[:2])) < (2, 28):
-            raise Unsupported(
+            raise UnsupportedError(
                 f'The ROS 2 wheels need glibc 2.28 or newer, here is {library} {release}: use a '
                 'newer Linux (Debian 10, Ubuntu 20.04 or later) or an installed ROS 2 Jazzy.'
             )
     for compiler in ('cc', 'c++'):
         if not shutil.which(compiler):
-            raise Unsupported(
+            raise UnsupportedError(
                 f'The messages are compiled, but there is no {compiler}: install a C and C++ '
                 'compiler (on Debian and Ubuntu: apt-get install g++).'
             )
     header = Path(sysconfig.get_path('include')) / 'Python.h'
     if not header.is_file():
-        raise Unsupported(
+        raise UnsupportedError(
             f'The messages need {header}: install the headers of Python {version} (on Debian and '
             f'Ubuntu: apt-get install python{version}-dev).'
         )
@@ -136,34 +137,20 @@ def repair_exported_paths() -> int:
     :return: the number of files changed.
     """
     python = VENV / 'bin' / 'python'
-    query = 'import numpy, sysconfig; print(sysconfig.get_path("include")); print(numpy.get_include())'
+    query = (
+        'import numpy, sysconfig; '
+        'print(sysconfig.get_path("include"), numpy.get_include(), sep="\\n")'
+    )
     answer = subprocess.run([python, '-c', query], check=True, capture_output=True, text=True)
-    include, numpy_include = answer.stdout.split()
-    tag = f'cp{sys.version_info[0]}{sys.version_info[1]}'
-    version = f'{sys.version_info[0]}.{sys.version_info[1]}'
-    builder = f'/opt/python/{tag}-{tag}'
+    include, numpy_include = answer.stdout.splitlines()
+    builders = r'/opt/python/cp\d+-cp\d+/[^";]*'
     changed = 0
     for path in VENV.glob('share/*/cmake/*Export.cmake'):
         text = path.read_text()
-        fixed = []
-        for line in text.splitlines(keepends=True):
-            if builder in line:
-                parts = line.split('"')
-                for i, part in enumerate(parts):
-                    if builder in part:
-                        parts[i] = ';'.join(
-                            (numpy_include if 'numpy' in item else include)
-                            if item.startswith(builder) else item
-                            for item in part.split(';')
-                        )
-                line = '"'.join(parts)
-            fixed.append(line)
-        new = ''.join(fixed)
-        if new != text:
-            path.write_text(new)
+        fixed = re.sub(builders, lambda m: numpy_include if 'numpy' in m[0] else include, text)
+        if fixed != text:
+            path.write_text(fixed)
             changed += 1
-        if f'{builder}/include/python{version}' in new:
-            raise Unsupported(f'{path} still names a path of its builder: please report this.')
     return changed
 
 
@@ -186,7 +173,7 @@ def main() -> int:
         if not ros_installed:
             repair_exported_paths()
         STAMP.write_text(wanted)
-    except Unsupported as problem:
+    except UnsupportedError as problem:
         print(problem, file=sys.stderr)
         return 1
     except subprocess.CalledProcessError as problem:

@@ -1,12 +1,11 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Command `demo`: the paper's two experiments, live through the nodes and again from their bags."""
+"""Command `demo`: the paper's two experiments, live through the nodes and from their bags."""
 
 import argparse
 import json
 import sys
 from pathlib import Path
-from typing import Any
 
 from damadics_fd.figures import six_panels
 from rich.console import Console

@@ -16,8 +16,8 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 
 from damadics_bringup.processes import (
-    Processes,
     ProcessError,
+    Processes,
     free_domain,
     parameters,
     surroundings,

@@ -11,6 +11,7 @@ from rclpy.node import Node
 
 from damadics_fd.core.alarm import NE107
 from damadics_fd.core.detector import Decision, Detector
+from damadics_fd.core.estimator import Estimate
 from damadics_fd.ros import qos
 from damadics_fd.ros.conversions import event_message, read_estimate, write_flag
 from damadics_fd.ros.diagnostics import Diagnostics, Level, Report
@@ -20,6 +21,7 @@ from damadics_fd.ros.waiting import InputWatch
 
 HEARTBEAT = 1.0  # s of wall time
 START_ESTIMATOR = 'start the estimator: ros2 run damadics_fd estimator'
+READY = Estimate._make([1] + [0.0] * 14 + [0])  # an estimate that makes the core compile
 
 
 class DetectorNode(Node):
@@ -35,6 +37,7 @@ class DetectorNode(Node):
             limits=(0.01, 3600.0),
         )
         settings = declare_settings(parameters)
+        Detector(settings).update(READY)
         self._core = Detector(settings)
         self._decision: Decision | None = None
         self._number = Float64Stamped()

@@ -18,6 +18,7 @@ from damadics_fd.ros.spin import spin
 from damadics_fd.ros.waiting import InputWatch
 
 START_PLANT = 'start a driver of the valve, or the simulator: ros2 run damadics_plant plant'
+READY = (1, 0.5, 0.5, 0.0, 0.0, 20.0, 0.0, 0.0)  # a sample that makes the core compile
 
 
 class EstimatorNode(Node):
@@ -33,6 +34,7 @@ class EstimatorNode(Node):
             limits=(0.01, 3600.0),
         )
         settings = declare_settings(parameters)
+        Estimator(settings).update(*READY)
         self._core = Estimator(settings)
         self._message = EstimateMessage()
         self._publisher = self.create_publisher(

@@ -40,6 +40,10 @@ def spin(make_node: Callable[[], SpinnableNode], args: list[str] | None = None) 
         print(problem, file=sys.stderr)
         rclpy.try_shutdown()
         return 1
+    except Exception:
+        if rclpy.ok():
+            raise
+        return 0  # a signal came while the node was starting
     executor = EventsExecutor()
     executor.add_node(node)
     try:

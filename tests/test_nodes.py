@@ -1,0 +1,224 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Estimator and detector as processes: samples in, flags out, bad input, parameters, signals."""
+
+import signal
+import subprocess
+import time
+
+import numpy as np
+import pytest
+import rclpy
+from damadics_bringup.processes import (
+    Processes,
+    executable,
+    free_domain,
+    parameters,
+    surroundings,
+)
+from damadics_fd.core.pipeline import run
+from damadics_fd.core.settings import Settings
+from damadics_fd.ros import qos
+from damadics_msgs.msg import Estimate, FaultFlag, Float64Stamped, Measurement
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.context import Context
+from rclpy.experimental import EventsExecutor
+from rclpy.qos import QoSProfile
+
+pytestmark = pytest.mark.ros
+PERIOD = 2_500_000  # ns
+
+
+class Peer:
+    """A node of the test in its own domain: publishes samples, keeps what the nodes publish."""
+
+    def __init__(self, domain: int) -> None:
+        self.context = Context()
+        rclpy.init(context=self.context, domain_id=domain)
+        self.node = rclpy.create_node('peer', context=self.context)
+        self.executor = EventsExecutor(context=self.context)
+        self.executor.add_node(self.node)
+        self.publisher = self.node.create_publisher(Measurement, 'measurement', qos.samples())
+        self.got: dict[str, list] = {}
+
+    def listen(self, kind, topic: str, profile: QoSProfile) -> list:
+        messages = self.got[topic] = []
+        self.node.create_subscription(kind, topic, messages.append, profile)
+        return messages
+
+    def wait(self, condition, patience: float = 10.0) -> bool:
+        deadline = time.monotonic() + patience
+        while not condition() and time.monotonic() < deadline:
+            self.executor.spin_once(timeout_sec=0.02)
+        return bool(condition())
+
+    def send(self, stamp: int, cv: float, x1: float, **others: float) -> None:
+        message = Measurement(cv=cv, x1=x1, p1=3.5e6, p2=2.6e6, t1=20.0, flow=5.0, ps=1e5)
+        for name, value in others.items():
+            setattr(message, name, value)
+        message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 1_000_000_000)
+        message.header.frame_id = 'LC74_20'
+        self.publisher.publish(message)
+
+    def send_columns(self, columns: dict[str, np.ndarray]) -> None:
+        """Send samples no faster than the chain takes them: a queue holds 1000."""
+        for n, values in enumerate(
+            zip(*(columns[k].tolist() for k in ('stamp', 'cv', 'x1')), strict=True), 1
+        ):
+            self.send(*values)
+            if n % 300 == 0:
+                assert self.wait(lambda n=n: len(self.got['threshold']) >= n), 'samples were lost'
+
+    def close(self) -> None:
+        self.executor.shutdown()
+        self.node.destroy_node()
+        self.context.try_shutdown()
+
+
+@pytest.fixture
+def domain(monkeypatch):
+    number = free_domain()
+    for name, value in surroundings(number).items():
+        monkeypatch.setenv(name, value)
+    return number
+
+
+@pytest.fixture
+def peer(domain):
+    peer = Peer(domain)
+    yield peer
+    peer.close()
+
+
+@pytest.fixture
+def processes(tmp_path, domain):
+    with Processes(tmp_path / 'logs', surroundings(domain)) as processes:
+        yield processes
+
+
+@pytest.fixture
+def chain(processes, peer):
+    """Start estimator and detector in paper mode and listen to all that they say."""
+    for name in ('estimator', 'detector'):
+        processes.start('damadics_fd', name, parameters(mode='paper'))
+    for kind, topic in ((Estimate, 'estimate'), (Float64Stamped, 'residual'),
+                        (Float64Stamped, 'threshold')):
+        peer.listen(kind, topic, qos.samples())
+    peer.listen(FaultFlag, 'fault_flag', qos.FLAG)
+    peer.listen(DiagnosticArray, '/diagnostics', qos.DIAGNOSTICS)
+    graph = peer.node
+    assert peer.wait(
+        lambda: peer.publisher.get_subscription_count() == 1
+        and graph.count_subscribers('/estimate') == 2
+        and graph.count_publishers('/residual') == 1
+        and peer.got['fault_flag'],
+        20.0,
+    ), 'the nodes did not start'
+    peer.wait(lambda: False, 0.5)
+    return peer
+
+
+def moving_stem(samples: int) -> dict[str, np.ndarray]:
+    t = np.arange(samples) * PERIOD * 1e-9
+    x1 = 0.5 + 0.3 * np.sin(1.5 * t) + 0.05 * (t > 1.0)
+    cv = 0.5 + 0.3 * np.sin(1.5 * t + 0.2)
+    return {'stamp': np.arange(samples) * PERIOD, 'cv': cv, 'x1': x1}
+
+
+def test_the_nodes_give_what_the_core_gives_bit_for_bit(chain):
+    columns = moving_stem(1200)
+    chain.send_columns(columns)
+    others = {'p1': 3.5e6, 'p2': 2.6e6, 't1': 20.0, 'flow': 5.0, 'ps': 1e5}
+    full = {name: np.full(1200, value) for name, value in others.items()}
+    result = run({**columns, **full}, Settings.for_mode('paper'))
+    assert [m.xi2 for m in chain.got['estimate']] == result.estimates['xi2'].tolist()
+    assert [m.x2 for m in chain.got['estimate']] == result.estimates['x2'].tolist()
+    assert [m.data for m in chain.got['residual']] == result.decisions['residual'].tolist()
+    assert [m.data for m in chain.got['threshold']] == result.decisions['threshold'].tolist()
+    assert result.detections, 'the step of the stem was meant to be flagged'
+    flagged = [m.header.stamp for m in chain.got['fault_flag'] if m.fault]
+    assert flagged[0].sec * 10**9 + flagged[0].nanosec == result.detections[0].stamp
+
+
+def test_bad_samples_do_not_reach_the_filters_and_are_counted(chain):
+    columns = moving_stem(600)
+    bad = {100: ('x1', float('nan')), 200: ('cv', float('inf')), 300: ('x1', 55.0)}
+    sent = 0
+    for n in range(600):
+        stamp, cv, x1 = (columns[k][n].item() for k in ('stamp', 'cv', 'x1'))
+        if n in bad:
+            name, value = bad[n]
+            chain.send(stamp, **{'cv': cv, 'x1': x1, name: value})
+            continue
+        chain.send(stamp, cv, x1)
+        sent += 1
+        if n == 400:  # the one before comes again, and one out of order
+            chain.send(stamp, cv, x1)
+            chain.send(stamp - 5 * PERIOD, cv, x1)
+    assert chain.wait(lambda: len(chain.got['estimate']) == sent)
+    chain.wait(lambda: False, 1.2)
+    assert len(chain.got['estimate']) == sent
+    kept = {k: np.delete(v, list(bad)) for k, v in columns.items()}
+    result = run(kept, Settings.for_mode('paper'))
+    assert [m.xi2 for m in chain.got['estimate']] == result.estimates['xi2'].tolist()
+    reports = [s for m in chain.got['/diagnostics'] for s in m.status if 'estimator' in s.name]
+    values = {v.key: v.value for v in reports[-1].values}
+    counts = {k: values[f'Samples {k}'] for k in
+              ('not finite', 'out of range', 'duplicate', 'out of order')}
+    assert counts == {'not finite': '2', 'out of range': '1', 'duplicate': '1',
+                      'out of order': '1'}
+
+
+def test_a_late_subscriber_gets_the_last_flag_at_once(chain):
+    chain.send_columns(moving_stem(600))
+    late = chain.listen(FaultFlag, 'fault_flag', qos.FLAG)
+    began = time.monotonic()
+    assert chain.wait(lambda: late)
+    assert time.monotonic() - began < 0.9, 'came with the next heartbeat only'
+    assert late[0].header.frame_id == 'LC74_20'
+
+
+def test_silence_is_not_health(chain):
+    chain.send(0, 0.5, 0.5)
+    chain.send(PERIOD, 0.5, 0.5)
+    flags = chain.got['fault_flag']
+    assert chain.wait(lambda: flags[-1].state == FaultFlag.STATE_HEALTHY)
+    assert chain.wait(lambda: flags[-1].state == FaultFlag.STATE_NOT_MONITORING, 1.5)
+
+
+@pytest.mark.parametrize('name', ['estimator', 'detector'])
+def test_a_node_alone_says_what_it_waits_for(processes, name):
+    processes.start('damadics_fd', name, parameters(mode='paper'))
+    deadline = time.monotonic() + 10.0
+    while 'waiting for' not in processes.log(name).read_text() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert 'ros2 run' in processes.log(name).read_text()
+    processes.end(name)
+
+
+@pytest.mark.parametrize('name', ['estimator', 'detector', 'recorder'])
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_signals_end_a_node_with_exit_code_0(domain, tmp_path, name, number):
+    arguments = ['--all', '--out', str(tmp_path / 'bag')] if name == 'recorder' else []
+    process = subprocess.Popen([executable('damadics_fd', name), *arguments])
+    try:
+        time.sleep(2.0)
+        assert process.poll() is None
+        process.send_signal(number)
+        began = time.monotonic()
+        assert process.wait(5.0) == 0
+        assert time.monotonic() - began < 2.0
+    finally:
+        process.kill()
+
+
+@pytest.mark.parametrize('name', ['estimator', 'detector'])
+def test_all_mistakes_in_the_parameters_are_listed(domain, name):
+    wrong = parameters(mode='paper', k1=-1.0, tau=0, no_such='x', decide_m='two')
+    done = subprocess.run(
+        [executable('damadics_fd', name), *wrong], capture_output=True, text=True, timeout=30
+    )
+    assert done.returncode == 1
+    for cause in ('k1: -1.0 is not within', 'tau: 0 is not a number with a decimal point',
+                  'no_such: there is no such parameter', "decide_m: 'two' is not"):
+        assert cause in done.stderr
