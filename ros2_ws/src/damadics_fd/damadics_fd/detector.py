@@ -84,7 +84,7 @@ class DetectorNode(Node):
     def _publish_flag(self) -> None:
         if self._decision is not None:
             write_flag(self._decision, self._flag)
-        if self._watch.silent and not self._flag.fault:
+        if self._watch.silent:
             self._flag.state = FaultFlag.STATE_NOT_MONITORING
         self._fault_flag.publish(self._flag)
 

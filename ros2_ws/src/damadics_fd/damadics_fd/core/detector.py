@@ -82,7 +82,8 @@ def step(s: Any, c: Any, g: Any, gc: Any, e: Any, d: Any) -> None:
     residual = abs(e.xi2)
     rho = threshold(c, e.phi, e.alpha1)
     ratio = min(residual / rho, LARGE) if rho > 0.0 else LARGE
-    exceed = armed and residual >= rho and not decision.gated(c, e)
+    # before anything moves both are 0 in paper mode: no evidence, though 0 >= 0
+    exceed = armed and residual >= rho and residual > 0.0 and not decision.gated(c, e)
     level = 0
     if armed:
         level = decision.vote(s, c, exceed, ratio)

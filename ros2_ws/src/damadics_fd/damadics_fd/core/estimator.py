@@ -23,6 +23,7 @@ from damadics_fd.core.modes import (
 from damadics_fd.core.settings import Settings
 
 SUBSTEPS = 1000  # at most, in one gap
+LARGEST_K2_DT = 1.5  # step of the printed observer, which is unstable from 2.8 on
 ESTIMATE = np.dtype((np.record, np.dtype([
     ('stamp', 'i8'), ('x2', 'f8'), ('x1_hat', 'f8'), ('x2_hat', 'f8'), ('xi1', 'f8'),
     ('xi2', 'f8'), ('phi', 'f8'), ('alpha1', 'f8'), ('alpha4', 'f8'), ('alpha5', 'f8'),
@@ -122,7 +123,8 @@ def progress_of(s: Any, c: Any) -> float:
 
 
 @jit
-def advance(s: Any, c: Any, phase: int, dt: float, x1: float, x2: float, u: float) -> None:
+def advance(s: Any, c: Any, phase: int, dt: float, x1_0: float, x2_0: float, u_0: float,
+            x1: float, x2: float, u: float) -> None:
     """
     Advance observer and, where the phase allows it, adaptation by one step.
 
@@ -130,15 +132,20 @@ def advance(s: Any, c: Any, phase: int, dt: float, x1: float, x2: float, u: floa
     :param c: settings record.
     :param phase: phase of the estimator.
     :param dt: time step [s].
-    :param x1: position, filtered [1].
-    :param x2: velocity [1/s].
-    :param u: input, filtered [1].
+    :param x1_0: position at the start of the step, filtered [1].
+    :param x2_0: velocity there [1/s].
+    :param u_0: input there, filtered [1].
+    :param x1: position at the end of the step, filtered [1].
+    :param x2: velocity there [1/s].
+    :param u: input there, filtered [1].
     """
-    approximator.observe(s, c, dt, x1, x2, u)
     if phase == PHASE_PAPER:
+        approximator.observe_printed(s, c, dt, x1_0, x2_0, u_0, x1, x2, u)
         approximator.adapt_alpha(s, c, dt, x1, u)
         approximator.adapt_phi(s, c, dt, x2)
-    elif phase in (PHASE_LEARN_ALPHA, PHASE_LEARN_PHI):
+        return
+    approximator.observe(s, c, dt, x1, x2, u)
+    if phase in (PHASE_LEARN_ALPHA, PHASE_LEARN_PHI):
         x = x1 - c.preload
         if x < c.gate_low or x > 1.0 - c.gate_high:
             return
@@ -195,15 +202,23 @@ def step(q: Any, s: Any, c: Any, e: Any, stamp: int, cv: float, x1: float, p1: f
         velocity.restart_input(s, u)
     velocity.filter_input(s, c, dt, u)
 
+    if afresh:  # there is no step before the first sample
+        x1_before, x2_before, u_before = s.x1, s.x2, s.u
+        dt = 0.0 if c.mode == PAPER else dt
+
     phase = phase_of(s, c)
-    parts = 1 if afresh else min(int(dt * c.sample_rate / 1.5) + 1, SUBSTEPS)
-    if parts == 1:
-        advance(s, c, phase, dt, s.x1, s.x2, s.u)
-    else:  # a gap: bridge it on straight lines between the filtered signals
-        for i in range(1, parts + 1):
-            part = i / parts
-            advance(s, c, phase, dt / parts, x1_before + part * (s.x1 - x1_before),
-                    x2_before + part * (s.x2 - x2_before), u_before + part * (s.u - u_before))
+    parts = max(1, int(dt * c.sample_rate / 1.5) + 1)
+    if c.mode == PAPER:
+        parts = max(parts, int(dt * c.k2 / LARGEST_K2_DT) + 1)
+    parts = min(parts, SUBSTEPS)
+    x1_0, x2_0, u_0 = x1_before, x2_before, u_before
+    for i in range(1, parts + 1):  # a gap is bridged on straight lines between filtered signals
+        part = i / parts
+        x1_1 = x1_before + part * (s.x1 - x1_before) if i < parts else s.x1
+        x2_1 = x2_before + part * (s.x2 - x2_before) if i < parts else s.x2
+        u_1 = u_before + part * (s.u - u_before) if i < parts else s.u
+        advance(s, c, phase, dt / parts, x1_0, x2_0, u_0, x1_1, x2_1, u_1)
+        x1_0, x2_0, u_0 = x1_1, x2_1, u_1
 
     e.stamp = stamp
     e.x2 = s.x2

@@ -41,10 +41,11 @@ class InputWatch:
         return self._last is None or time.monotonic() - self._last > self._timeout
 
     def _remind(self) -> None:
+        period = FIRST_WORD
         if self.silent:
-            self._timer.timer_period_ns = int(NEXT_WORDS * 1e9)
+            period = NEXT_WORDS
             topic = self._node.resolve_topic_name(self._topic)
             since = 'waiting for' if self._last is None else 'nothing comes any more on'
             self._node.get_logger().warning(f'{since} {topic}: {self._command}')
-        else:
-            self._timer.timer_period_ns = int(FIRST_WORD * 1e9)
+        self._timer.timer_period_ns = int(period * 1e9)
+        self._timer.reset()
