@@ -21,4 +21,7 @@ if ! (cd ros2_ws && "$python" -m colcon --log-base log build --event-handlers co
   echo "The build failed; the whole output is in $log." >&2
   exit 1
 fi
+echo 'Compiling the hot loops ...'
+set +u; source ./env.sh; set -u
+python tools/compile_kernels.py
 touch ros2_ws/install/.built

@@ -7,7 +7,6 @@ from damadics_fd.core.detector import Detector
 from damadics_fd.core.estimator import Estimator
 from damadics_fd.core.pipeline import run
 from damadics_fd.core.settings import Settings
-from damadics_plant import simulate
 
 SAMPLE = (0.5, 0.5, 3.5e6, 2.6e6, 20.0, 5.0, 1e5)
 
@@ -17,4 +16,3 @@ Detector(settings).update(estimate)
 names = ('cv', 'x1', 'p1', 'p2', 't1', 'flow', 'ps')
 columns = {name: np.array([value]) for name, value in zip(names, SAMPLE, strict=True)}
 run({'stamp': np.array([1]), **columns}, settings)
-simulate('paper_nominal', rate=400.0)
