@@ -12,28 +12,9 @@ from damadics_fd.bag.cdr import layout_of
 from damadics_fd.bag.definition import parse_definition, schema_text, type_hash
 from damadics_fd.bag.rosbag2 import qos
 
-MEASUREMENT = 'damadics_msgs/msg/Measurement'
-FAULT_STATE = 'damadics_msgs/msg/FaultState'
+from .bag_support import FAULT_STATE, MEASUREMENT, needs_messages, simulated
 
-
-def installed() -> bool:
-    try:
-        return bool(type_hash(MEASUREMENT))
-    except BagError:
-        return False
-
-
-pytestmark = pytest.mark.skipif(not installed(), reason='damadics_msgs is not built')
-
-
-def simulated(n: int = 4000) -> dict[str, np.ndarray]:
-    t = np.arange(n) * 2_500_000
-    rng = np.random.default_rng(1)
-    return {
-        'stamp': t + 5_999_999_999, 'cv': rng.random(n), 'x1': rng.random(n), 'p1': rng.random(n),
-        'p2': rng.random(n), 't1': rng.random(n), 'flow': rng.random(n),
-        'fault': np.where(t > 3_000_000_000, 4, 0), 'strength': rng.random(n),
-    }
+pytestmark = needs_messages
 
 
 def decoded(path: Path, topic: str) -> list:

@@ -79,7 +79,7 @@ class ChunkHead:
     compression: str
 
 
-def record(op: Op, *parts: bytes) -> bytes:
+def record(op: int, *parts: bytes) -> bytes:
     """Put the head of a record before its content."""
     content = b''.join(parts)
     return HEAD.pack(op, len(content)) + content

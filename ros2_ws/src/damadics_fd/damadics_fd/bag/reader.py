@@ -1,0 +1,330 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Read MCAP files by chunk, whole or damaged."""
+
+import os
+import re
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import BinaryIO, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from damadics_fd.bag import kernels
+from damadics_fd.bag.errors import BagError
+from damadics_fd.bag.limits import Limits
+from damadics_fd.bag.records import (
+    FOOTER,
+    FOOTER_SIZE,
+    HEAD,
+    MAGIC,
+    Channel,
+    Fields,
+    Op,
+    Schema,
+    parse_channel,
+    parse_chunk,
+    parse_metadata,
+    parse_schema,
+    record,
+)
+from damadics_fd.bag.unpack import decompress, open_plain
+from damadics_fd.bag.wellformed import well_formed
+
+LOOSE = 1 << 20  # [B] handled at a time where there are no chunks
+_HEAD_PATTERN = re.compile(rb'[\x01-\x0f].{4}\x00{4}', re.DOTALL)
+
+
+class _GivenUp(Exception):  # noqa: N818
+    """There are too many damaged places."""
+
+
+class _Found(NamedTuple):
+    """A record; the content of a chunk is decompressed and checked."""
+
+    op: int
+    length: int
+    content: bytes = b''
+
+
+class Problem(NamedTuple):
+    """A damaged place."""
+
+    offset: int
+    text: str
+
+
+@dataclass
+class Batch:
+    """
+    The messages of one chunk.
+
+    :param data: records, uint8.
+    :param channels: channel number of each message.
+    :param starts: place of the data of each message.
+    :param sizes: size of the data of each message [B].
+    :param offset: place of the chunk in the file.
+    """
+
+    data: NDArray[np.uint8]
+    channels: NDArray[np.uint16]
+    starts: NDArray[np.int64]
+    sizes: NDArray[np.int64]
+    offset: int
+
+    def log_times(self, rows: NDArray[np.intp] | slice = slice(None)) -> NDArray[np.int64]:
+        """Return the log times of some messages [ns]."""
+        out = np.empty((1, len(self.starts[rows])), np.uint64)
+        offsets = np.array([-16], np.int64)
+        kernels.gather8(self.data, self.starts[rows], offsets, out)
+        return out[0].view(np.int64)
+
+    def message(self, row: int) -> bytes:
+        """Return one serialised message."""
+        start = self.starts[row]
+        return self.data[start:start + self.sizes[row]].tobytes()
+
+
+@dataclass
+class Summary:
+    """What the end of a finished file says about it."""
+
+    schemas: dict[int, Schema] = field(default_factory=dict)
+    channels: dict[int, Channel] = field(default_factory=dict)
+    counts: dict[int, int] = field(default_factory=dict)  # messages by channel
+    chunks: list[int] = field(default_factory=list)  # offsets
+
+
+class McapFile:
+    """
+    Read one MCAP file.
+
+    :param path: file, possibly compressed as a whole (`.zstd`).
+    :param tolerant: read on behind damage and collect it in `problems`; otherwise it is an error.
+    :param limits: what the file may ask for.
+    :raises BagError: where the file cannot be opened or is no MCAP file.
+    """
+
+    def __init__(self, path: str | Path, tolerant: bool = False, limits: Limits = Limits()):  # noqa: B008
+        self.path = Path(path)
+        self.limits = limits
+        self.problems: list[Problem] = []
+        self.schemas: dict[int, Schema] = {}
+        self.channels: dict[int, Channel] = {}
+        self.metadata: list[tuple[str, dict[str, str]]] = []
+        self.profile = ''
+        self.ended = False  # the walk has seen the end of the data section
+        self._tolerant = tolerant
+        self._text = 0
+        self._stream: BinaryIO = open_plain(self.path, limits)
+        self._size = os.fstat(self._stream.fileno()).st_size
+        self.summary = self._read_summary()
+        self.schemas.update(self.summary.schemas)
+        self.channels.update(self.summary.channels)
+
+    def __enter__(self) -> Self:
+        """Return the file."""
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        """Close the file."""
+        self._stream.close()
+
+    def _read(self, at: int, size: int) -> bytes:
+        return os.pread(self._stream.fileno(), size, at)
+
+    def problem(self, offset: int, text: str) -> None:
+        """Note damage, or raise it where it is not tolerated."""
+        if not self._tolerant:
+            raise BagError(f'{text} (at byte {offset}); see verify and recover', self.path)
+        self.problems.append(Problem(offset, text))
+        if len(self.problems) > self.limits.problems:
+            raise _GivenUp
+
+    def _read_summary(self) -> Summary:
+        """Read the summary; an empty one where it is absent or damaged."""
+        summary = Summary()
+        tail = self._read(max(0, self._size - FOOTER_SIZE - len(MAGIC)), FOOTER_SIZE + len(MAGIC))
+        if len(tail) < FOOTER_SIZE + len(MAGIC) or not tail.endswith(MAGIC):
+            return summary
+        op, length = HEAD.unpack_from(tail)
+        start, _, crc = FOOTER.unpack_from(tail, HEAD.size)
+        end = self._size - len(MAGIC) - FOOTER_SIZE
+        if op != Op.FOOTER or length != FOOTER.size or not 0 < start <= end:
+            return summary
+        if end - start > self.limits.record:
+            return summary
+        data = self._read(start, end - start + FOOTER_SIZE - 4)
+        if crc and zlib.crc32(data) != crc:
+            return summary
+        try:
+            self._parse_summary(memoryview(data)[:end - start], summary)
+        except BagError:
+            return Summary()  # reported when the walk comes there
+        return summary
+
+    def _parse_summary(self, data: memoryview, summary: Summary) -> None:
+        at = 0
+        while at < len(data):
+            fields = Fields(data[at:])
+            op, length = fields.unpack(HEAD)
+            content = fields.take(length)
+            at += HEAD.size + length
+            if op == Op.SCHEMA:
+                schema = parse_schema(content)
+                summary.schemas[schema.id] = schema
+            elif op == Op.CHANNEL:
+                channel = parse_channel(content)
+                summary.channels[channel.id] = channel
+            elif op == Op.CHUNK_INDEX:
+                summary.chunks.append(int.from_bytes(content[16:24], 'little'))
+            elif op == Op.STATISTICS:
+                counts = Fields(content[46:])
+                pairs = np.frombuffer(counts.take(counts.left // 10 * 10), '<u2,<u8')
+                summary.counts = {int(number): int(count) for number, count in pairs}
+
+    def batches(self) -> Iterator[Batch]:
+        """
+        Yield the messages chunk by chunk in file order.
+
+        :raises BagError: at damage, unless it is tolerated.
+        """
+        loose: list[bytes] = []  # messages outside of chunks
+        size = 0
+        try:
+            for at, found in self._records():
+                if found.op == Op.MESSAGE:
+                    loose.append(record(found.op, found.content))
+                    size += len(loose[-1])
+                    if size < LOOSE:
+                        continue
+                if loose:
+                    yield from self._index(b''.join(loose), at)
+                    loose, size = [], 0
+                if found.op == Op.CHUNK:
+                    yield from self._index(found.content, at)
+            if loose:
+                yield from self._index(b''.join(loose), self._size)
+        except _GivenUp:
+            self.problems.append(Problem(self._size, 'too many damaged places: the rest is left'))
+
+    def _records(self) -> Iterator[tuple[int, '_Found']]:
+        """Yield chunks and messages of the data section; take note of everything else."""
+        at = 0
+        if self._read(0, len(MAGIC)) == MAGIC:
+            at = len(MAGIC)
+        else:
+            self.problem(0, 'does not start as an MCAP file')
+        while at < self._size:
+            try:
+                found = self._record(at)
+            except BagError as error:
+                self.problem(at, error.reason)
+                following = self._search(at + 1)
+                if following is None:
+                    return
+                at = following
+                continue
+            if found.op in (Op.DATA_END, Op.FOOTER):
+                self.ended = True
+                return
+            if found.op in (Op.CHUNK, Op.MESSAGE):
+                yield at, found
+            at += HEAD.size + found.length
+        self.problem(at, 'ends without a footer: the recording was not closed')
+
+    def _record(self, at: int) -> '_Found':
+        """Read the record at a place; raise where there is none."""
+        head = self._read(at, HEAD.size)
+        if len(head) < HEAD.size:
+            raise BagError('ends in the middle of a record')
+        op, length = HEAD.unpack(head)
+        if at + HEAD.size + length > self._size:
+            raise BagError('ends in the middle of a record, or the record is damaged')
+        if length > self.limits.record:
+            raise BagError(f'a record of {length} bytes is beyond the limit')
+        if op >= 0x80:
+            return _Found(op, length)  # private records are none of our business
+        if not 0 < op < 0x10:
+            raise BagError(f'there is no record type {op:#x}')
+        op = Op(op)
+        content = self._read(at + HEAD.size, length if op in _PARSED else min(length, 512))
+        if not well_formed(op, content, length):
+            raise BagError(f'the {op.name} record is damaged')
+        if op == Op.CHUNK:
+            chunk, packed = parse_chunk(content)
+            content = decompress(chunk, packed, self.limits)
+            if chunk.crc and zlib.crc32(content) != chunk.crc:
+                raise BagError('a chunk is damaged: its CRC does not match')
+        else:
+            self._note(op, content)
+        return _Found(op, length, content)
+
+    def _note(self, op: Op, content: bytes) -> None:
+        if op in (Op.SCHEMA, Op.CHANNEL):
+            self._text += len(content)
+            if self._text > self.limits.text:
+                raise BagError('the schemas and channels are beyond the limit')
+        if op == Op.HEADER:
+            self.profile = Fields(content).string()
+        elif op == Op.SCHEMA:
+            schema = parse_schema(content)
+            self.schemas.setdefault(schema.id, schema)  # the summary has a CRC, this has not
+        elif op == Op.CHANNEL:
+            channel = parse_channel(content)
+            self.channels.setdefault(channel.id, channel)
+        elif op == Op.METADATA:
+            self.metadata.append(parse_metadata(content))
+
+    def _index(self, data: bytes, at: int) -> Iterator[Batch]:
+        buffer = np.frombuffer(data, np.uint8)
+        most = len(buffer) // kernels.MESSAGE_HEAD + 1
+        channels, starts = np.empty(most, np.uint16), np.empty(most, np.int64)
+        sizes, others = np.empty(most, np.int64), np.empty(1 << 17, np.int64)
+        n, k, end = kernels.index(buffer, channels, starts, sizes, others)
+        for place in others[:k]:
+            op, length = HEAD.unpack_from(data, place)
+            content = data[place + HEAD.size:place + HEAD.size + length]
+            try:
+                self._note(Op(op), content)
+            except BagError as error:
+                self.problem(at, error.reason)
+        if end != len(buffer):
+            self.problem(at, 'a chunk ends in the middle of a record')
+        if n:
+            yield Batch(buffer, channels[:n], starts[:n], sizes[:n], at)
+
+    def _search(self, at: int) -> int | None:
+        """Find the next place where records follow each other again."""
+        window = 1 << 12
+        while at < self._size:
+            data = self._read(at, window + HEAD.size)
+            for match in _HEAD_PATTERN.finditer(data):
+                if self._chain(at + match.start()):
+                    return at + match.start()
+            at += window
+            window = min(4 * window, LOOSE)
+        return None
+
+    def _chain(self, at: int, links: int = 3) -> bool:
+        """Tell whether whole records follow each other from here."""
+        for _ in range(links):
+            head = self._read(at, HEAD.size + 512)
+            if len(head) < HEAD.size:
+                return False
+            op, length = HEAD.unpack_from(head)
+            end = at + HEAD.size + length
+            if not 0 < op < 0x10 or length > self.limits.record or end > self._size:
+                return False
+            if not well_formed(Op(op), head[HEAD.size:][:length], length):
+                return False
+            if op == Op.FOOTER or end == self._size:
+                return True
+            at = end
+        return True
+
+
+_PARSED = (Op.HEADER, Op.SCHEMA, Op.CHANNEL, Op.MESSAGE, Op.CHUNK, Op.METADATA)
