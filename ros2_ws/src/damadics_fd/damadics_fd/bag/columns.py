@@ -189,8 +189,8 @@ class Decoder:
         places = self._places(layout)
         columns: Columns = {}
         wide = [
-            place for place in places.values()
-            if isinstance(place, Place) and place.dtype in ('f8', 'i8', 'u8') and place.repeat is None
+            place for place in places.values() if isinstance(place, Place)
+            and place.dtype in ('f8', 'i8', 'u8') and place.repeat is None
         ]
         if wide:
             out = np.empty((len(wide), len(starts)), np.uint64)
