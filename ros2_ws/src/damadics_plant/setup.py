@@ -23,7 +23,7 @@ setup(
     entry_points={
         'console_scripts': [
             'plant = damadics_plant.plant:main',
-            'simulate = damadics_plant.simulate:main',
+            'simulate = damadics_plant.command:main',
         ],
     },
 )

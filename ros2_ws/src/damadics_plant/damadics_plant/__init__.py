@@ -1,2 +1,21 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
+"""
+The DAMADICS actuator: control valve, servomotor and positioner with the benchmark's 19 faults.
+
+>>> from damadics_plant import simulate
+>>> run = simulate('paper_friction')
+>>> run.t[-1], run.fault[-1]
+(np.float64(120.0), np.int64(4))
+"""
+
+from damadics_plant.faults import CATALOGUE, Fault
+from damadics_plant.library import ScenarioError, load_scenario, read_scenarios, scenario_names
+from damadics_plant.parameters import Actuator, LuGreActuator
+from damadics_plant.scenario import Scenario
+from damadics_plant.simulator import Run, Simulator, simulate
+
+__all__ = [
+    'CATALOGUE', 'Actuator', 'Fault', 'LuGreActuator', 'Run', 'Scenario', 'ScenarioError',
+    'Simulator', 'load_scenario', 'read_scenarios', 'scenario_names', 'simulate',
+]

@@ -1,0 +1,42 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""The transmitters of the actuator, noise-free: position, pressures, temperature, flow."""
+
+import numpy as np
+from damadics_fd.core.jit import jit
+
+from damadics_plant.physics import Record
+from damadics_plant.valve import compressibility, valve_flow, water_density
+
+OUTPUTS = ('x1', 'p1', 'p2', 't1', 'flow', 'ps', 'fault', 'strength')
+"""Rows of the output of a model, in SI."""
+
+
+@jit
+def measure(xr: float, x: float, ps: float, p1: float, p2: float, t1: float,
+            pv: float, a: Record, e: Record, out: np.ndarray) -> None:
+    """
+    Fill one sample of the outputs, each within the range of its transmitter.
+
+    :param xr: relative position of the plug with the offsets of f2 and f3.
+    :param x: position of the stem / stroke.
+    :param ps: pressure of the chamber [Pa].
+    :param p1: inlet pressure, faulty where f17 is active [Pa].
+    :param p2: outlet pressure [Pa].
+    :param t1: temperature of the medium, faulty where f7 is active [degC].
+    :param pv: its vapour pressure [Pa].
+    :param a: constants of the actuator.
+    :param e: effects of the faults.
+    :param out: receives `OUTPUTS`; shape (8,).
+    """
+    p = max(p1, pv)
+    density = water_density(t1) / (1.0 - compressibility(t1) * p)
+    flow = valve_flow(xr, p, p2, pv, density, a, e)
+    out[0] = min(max(x * e.position, 0.0), 1.0)
+    out[1] = min(max(p1, 0.0), 4e6)
+    out[2] = min(max(p2, 0.0), 4e6)
+    out[3] = min(max(t1, 0.0), 200.0)
+    out[4] = min(max(flow * e.flow_sensor, 0.0), 40.0) / 3.6
+    out[5] = ps * e.ps_sensor
+    out[6] = e.number
+    out[7] = e.strength
