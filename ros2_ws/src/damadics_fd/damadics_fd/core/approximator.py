@@ -12,6 +12,23 @@ STATE = [('xh1', 'f8'), ('xh2', 'f8'), ('xi1', 'f8'), ('xi2', 'f8'), ('phi', 'f8
 
 
 @jit
+def begin(s: Any, c: Any) -> None:
+    """
+    Forget what was learned.
+
+    :param s: state record.
+    :param c: settings record with the initial alphas.
+    """
+    s.ah1 = c.alpha1
+    s.ah4 = c.alpha4
+    s.ah5 = c.alpha5
+    s.w1[:] = 0.0
+    s.w2[:] = 0.0
+    s.eps1 = 0.0
+    s.b1 = 0.0
+
+
+@jit
 def restart(s: Any, x1: float) -> None:
     """
     Put the observer on a position at rest; what is learned stays.

@@ -7,19 +7,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from damadics_fd.core import approximator, force, quality, velocity
+from damadics_fd.core import approximator, force, learning, quality, velocity
 from damadics_fd.core.jit import jit
-from damadics_fd.core.modes import (
-    MONITOR,
-    PAPER,
-    PHASE_HOLD,
-    PHASE_INIT,
-    PHASE_LEARN_ALPHA,
-    PHASE_LEARN_PHI,
-    PHASE_MONITOR,
-    PHASE_PAPER,
-    PHASES,
-)
+from damadics_fd.core.modes import MONITOR, PAPER, PHASE_PAPER, PHASES
 from damadics_fd.core.settings import Settings
 
 SUBSTEPS = 1000  # at most, in one gap
@@ -30,10 +20,7 @@ ESTIMATE = np.dtype((np.record, np.dtype([
     ('x1', 'f8'), ('u', 'f8'), ('ps', 'f8'), ('dp', 'f8'), ('progress', 'f8'), ('phase', 'i8'),
 ])))
 STATE = np.dtype((np.record, np.dtype([
-    ('elapsed', 'i8'),  # ns of monitored time since the first sample, gaps of restarts left out
-    ('held_until', 'i8'),  # elapsed time at which the filters have settled after a restart
-    ('armed', '?'), ('travel', 'f8'),
-    *velocity.STATE, *approximator.STATE,
+    *learning.STATE, *velocity.STATE, *approximator.STATE,
 ], align=True)))
 
 
@@ -67,61 +54,6 @@ class Estimate(NamedTuple):
         return self.alpha1, self.alpha4, self.alpha5
 
 
-def begin(s: Any, c: Any) -> None:
-    """
-    Set a state record to "nothing learned".
-
-    :param s: state record of zeros.
-    :param c: settings record.
-    """
-    s.ah1 = c.alpha1
-    s.ah4 = c.alpha4
-    s.ah5 = c.alpha5
-
-
-@jit
-def phase_of(s: Any, c: Any) -> int:
-    """
-    Return the phase for the time spent and the travel seen.
-
-    :param s: state record.
-    :param c: settings record.
-    :return: a PHASE constant.
-    """
-    if c.mode == PAPER:
-        return PHASE_PAPER
-    if s.elapsed < s.held_until:
-        return PHASE_HOLD
-    if s.armed:
-        return PHASE_MONITOR
-    t = s.elapsed * 1e-9
-    if t < c.t_on:
-        return PHASE_INIT
-    if t < c.t_w:
-        return PHASE_LEARN_ALPHA
-    if t < c.t_learn or s.travel < c.travel_min:
-        return PHASE_LEARN_PHI
-    s.armed = True
-    return PHASE_MONITOR
-
-
-@jit
-def progress_of(s: Any, c: Any) -> float:
-    """
-    Return the share of the learning that is done.
-
-    :param s: state record.
-    :param c: settings record.
-    :return: 0..1.
-    """
-    if c.mode == PAPER or s.armed:
-        return 1.0
-    wait = c.t_w / c.t_learn if c.t_learn > 0.0 else 0.0
-    done = min(1.0, s.elapsed * 1e-9 / c.t_learn) if c.t_learn > 0.0 else 1.0
-    moved = min(1.0, s.travel / c.travel_min) if c.travel_min > 0.0 else 1.0
-    return min(done, wait + (1.0 - wait) * moved)
-
-
 @jit
 def advance(s: Any, c: Any, phase: int, dt: float, x1_0: float, x2_0: float, u_0: float,
             x1: float, x2: float, u: float) -> None:
@@ -141,19 +73,9 @@ def advance(s: Any, c: Any, phase: int, dt: float, x1_0: float, x2_0: float, u_0
     """
     if phase == PHASE_PAPER:
         approximator.observe_printed(s, c, dt, x1_0, x2_0, u_0, x1, x2, u)
-        approximator.adapt_alpha(s, c, dt, x1, u)
-        approximator.adapt_phi(s, c, dt, x2)
-        return
-    approximator.observe(s, c, dt, x1, x2, u)
-    if phase in (PHASE_LEARN_ALPHA, PHASE_LEARN_PHI):
-        x = x1 - c.preload
-        if x < c.gate_low or x > 1.0 - c.gate_high:
-            return
-        approximator.adapt_alpha(s, c, dt, x1, u)
-        if phase == PHASE_LEARN_PHI:
-            approximator.adapt_phi(s, c, dt, x2)
-            if abs(x2) > c.travel_speed:
-                s.travel += abs(x2) * dt
+    else:
+        approximator.observe(s, c, dt, x1, x2, u)
+    learning.adapt(s, c, phase, dt, x1, x2, u)
 
 
 @jit
@@ -190,7 +112,10 @@ def step(q: Any, s: Any, c: Any, e: Any, stamp: int, cv: float, x1: float, p1: f
         dt = -dt
         velocity.restart(s, y)
         approximator.restart(s, y)
-        s.held_until = 0 if first else s.elapsed + int(c.hold * 1e9)
+        if first:
+            s.place = x1
+        if s.armed or not first:
+            s.held_until = s.elapsed + int(c.hold * 1e9)
     else:
         s.elapsed += int(dt * 1e9 + 0.5)
     x1_before, x2_before, u_before = s.x1, s.x2, s.u
@@ -206,7 +131,7 @@ def step(q: Any, s: Any, c: Any, e: Any, stamp: int, cv: float, x1: float, p1: f
         x1_before, x2_before, u_before = s.x1, s.x2, s.u
         dt = 0.0 if c.mode == PAPER else dt
 
-    phase = phase_of(s, c)
+    phase = learning.phase_of(s, c)
     parts = max(1, int(dt * c.sample_rate / 1.5) + 1)
     if c.mode == PAPER:
         parts = max(parts, int(dt * c.k2 / LARGEST_K2_DT) + 1)
@@ -219,6 +144,8 @@ def step(q: Any, s: Any, c: Any, e: Any, stamp: int, cv: float, x1: float, p1: f
         u_1 = u_before + part * (s.u - u_before) if i < parts else s.u
         advance(s, c, phase, dt / parts, x1_0, x2_0, u_0, x1_1, x2_1, u_1)
         x1_0, x2_0, u_0 = x1_1, x2_1, u_1
+
+    learning.follow(s, c, phase, dt)
 
     e.stamp = stamp
     e.x2 = s.x2
@@ -234,7 +161,7 @@ def step(q: Any, s: Any, c: Any, e: Any, stamp: int, cv: float, x1: float, p1: f
     e.u = u
     e.ps = ps
     e.dp = p1 - p2
-    e.progress = progress_of(s, c)
+    e.progress = learning.progress_of(s, c)
     e.phase = phase
     return reason
 
@@ -262,6 +189,17 @@ def update(q: NDArray, s: NDArray, c: NDArray, e: NDArray, stamp: int, cv: float
     return step(q[0], s[0], c[0], e[0], stamp, cv, x1, p1, p2, t1, flow, ps)
 
 
+@jit
+def start(s: NDArray, c: NDArray) -> None:
+    """
+    Set an estimator state to "nothing learned".
+
+    :param s: estimator state.
+    :param c: settings.
+    """
+    learning.forget(s[0], c[0])
+
+
 class Estimator:
     """
     Estimate velocity, residual and learned bound from one measurement after the other.
@@ -270,8 +208,8 @@ class Estimator:
 
     >>> import math
     >>> estimator = Estimator(Settings.for_mode('paper'))
-    >>> estimator.update(0, 1.0, 0.0, 3.5e6, 2.6e6, 20.0, 12.0, math.nan).phase == PHASE_PAPER
-    True
+    >>> estimator.update(0, 1.0, 0.0, 3.5e6, 2.6e6, 20.0, 12.0, math.nan).phase
+    4
     >>> estimator.update(2_500_000, 1.0, math.nan, 3.5e6, 2.6e6, 20.0, 12.0, math.nan)
     >>> estimator.last_rejection
     'not_finite: x1 = nan'
@@ -291,7 +229,7 @@ class Estimator:
         self.quality[:] = np.zeros(1, quality.DTYPE)
         self.state[:] = np.zeros(1, STATE)
         self.last_rejection = ''
-        begin(self.state[0], self._settings[0])
+        start(self.state, self._settings)
 
     def update(self, stamp: int, cv: float, x1: float, p1: float, p2: float, t1: float,
                flow: float, ps: float) -> Estimate | None:

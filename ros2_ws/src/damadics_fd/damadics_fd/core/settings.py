@@ -130,8 +130,15 @@ class Settings:
     t_w: float = _number('s', 'start of the learning of Phi', 0.0, 1e6, 0.0, 20.0)
     t_learn: float = _number('s', 'earliest end of learning', 0.0, 1e7, 0.0, 60.0)
     travel_min: float = _number('', 'stem travel / stroke that learning needs', 0.0, 1e6, 0.0, 0.5)
-    travel_speed: float = _number('1/s', 'slower motion does not count as travel', 0.0, 10.0,
-                                  0.005, 0.005)
+    play: float = _number('', 'motion within a play of this half width is no travel', 0.0, 0.5,
+                          0.005, 0.005)
+    settled_stiffness: float = _number('', 'change of the stiffness while learning that is '
+                                       'tolerated', 1e-6, 1.0, 0.004, 0.004)
+    settled_friction: float = _number('', 'change of the friction / (K L) while learning that is '
+                                      'tolerated', 1e-6, 1.0, 0.0018, 0.0018)
+    settled_max: float = _number('', 'squared distance, in standard deviations, from the valve at '
+                                 'the start of learning that makes it start again', 1.0, 1e12,
+                                 60.0, 60.0)
     gate_low: float = _number('', 'stem closer to the open stop: a push from the stop is ignored',
                               0.0, 0.5, 0.0, 0.01)
     gate_high: float = _number('', 'stem closer to the closed stop: nothing is decided or learned',

@@ -1,0 +1,171 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""State machine of monitor mode: INIT, LEARN_ALPHA, LEARN_PHI, MONITOR, and HOLD after a gap."""
+
+from typing import Any
+
+from damadics_fd.core import approximator, settled
+from damadics_fd.core.jit import jit
+from damadics_fd.core.modes import (
+    PAPER,
+    PHASE_HOLD,
+    PHASE_INIT,
+    PHASE_LEARN_ALPHA,
+    PHASE_LEARN_PHI,
+    PHASE_MONITOR,
+    PHASE_PAPER,
+)
+
+STATE = [('elapsed', 'i8'),  # ns since the first sample, gaps that restart the filters left out
+         ('start', 'i8'),  # elapsed time at which learning began
+         ('held_until', 'i8'),  # elapsed time at which the filters have settled after a restart
+         ('armed', '?'), *settled.STATE]
+
+
+@jit
+def forget(s: Any, c: Any) -> None:
+    """
+    Forget what was learned and the travel seen, not the first block of the settled check.
+
+    :param s: state record.
+    :param c: settings record.
+    """
+    approximator.begin(s, c)
+    s.armed = False
+    s.travel = 0.0
+    s.compared = 0
+    s.block[:] = 0.0
+    s.block_end = 0
+
+
+@jit
+def guarded(c: Any) -> bool:
+    """
+    Tell whether there is a learning time in which the valve can be compared with itself.
+
+    :param c: settings record.
+    :return: True unless the learning of Phi is set to last no time.
+    """
+    return c.t_learn > c.t_w
+
+
+@jit
+def phase_of(s: Any, c: Any) -> int:
+    """
+    Return the phase; arm where the time is up, the stem has travelled and the valve is settled.
+
+    :param s: state record.
+    :param c: settings record.
+    :return: a PHASE constant.
+    """
+    if c.mode == PAPER:
+        return PHASE_PAPER
+    if s.elapsed < s.held_until:
+        return PHASE_HOLD
+    if s.armed:
+        return PHASE_MONITOR
+    t = (s.elapsed - s.start) * 1e-9
+    if t < c.t_on:
+        return PHASE_INIT
+    if t < c.t_w:
+        return PHASE_LEARN_ALPHA
+    if guarded(c) and not settle(s, c):
+        return PHASE_LEARN_PHI
+    if t < c.t_learn or s.travel < c.travel_min or (guarded(c) and s.compared == 0):
+        return PHASE_LEARN_PHI
+    s.armed = True
+    return PHASE_MONITOR
+
+
+@jit
+def settle(s: Any, c: Any) -> bool:
+    """
+    Close the block of the settled check when it is full; learn afresh where the valve changed.
+
+    :param s: state record.
+    :param c: settings record.
+    :return: False where learning starts again.
+    """
+    length = int((c.t_learn - c.t_w) / 3.0 * 1e9)
+    if s.block_end == 0:
+        s.block_end = s.start + int(c.t_w * 1e9) + length
+    if s.elapsed < s.block_end:
+        return True
+    s.block_end += length
+    if settled.close_block(s, c):
+        return True
+    forget(s, c)
+    s.unsettled += 1
+    s.start = s.elapsed - int(c.t_w * 1e9)
+    return False
+
+
+@jit
+def progress_of(s: Any, c: Any) -> float:
+    """
+    Return the share of the learning that is done.
+
+    :param s: state record.
+    :param c: settings record.
+    :return: 0..1.
+    """
+    if c.mode == PAPER or s.armed:
+        return 1.0
+    wait = c.t_w / c.t_learn if c.t_learn > 0.0 else 0.0
+    done = min(1.0, (s.elapsed - s.start) * 1e-9 / c.t_learn) if c.t_learn > 0.0 else 1.0
+    moved = min(1.0, s.travel / c.travel_min) if c.travel_min > 0.0 else 1.0
+    return min(done, wait + (1.0 - wait) * moved)
+
+
+@jit
+def gated(c: Any, x: float) -> bool:
+    """
+    Tell whether a stop may push the stem or the plug force is too steep to be learned from.
+
+    :param c: settings record.
+    :param x: stem position, filtered [1].
+    :return: True where nothing is learned.
+    """
+    return x < c.gate_low or x > 1.0 - c.gate_high
+
+
+@jit
+def adapt(s: Any, c: Any, phase: int, dt: float, x1: float, x2: float, u: float) -> None:
+    """
+    Adapt by one step what the phase allows.
+
+    :param s: state record after `approximator.observe`.
+    :param c: settings record.
+    :param phase: phase of the estimator.
+    :param dt: time step [s].
+    :param x1: position, filtered [1].
+    :param x2: velocity [1/s].
+    :param u: input, filtered [1].
+    """
+    if phase == PHASE_PAPER:
+        approximator.adapt_alpha(s, c, dt, x1, u)
+        approximator.adapt_phi(s, c, dt, x2)
+    elif phase in (PHASE_LEARN_ALPHA, PHASE_LEARN_PHI) and not gated(c, x1 - c.preload):
+        approximator.adapt_alpha(s, c, dt, x1, u)
+        if phase == PHASE_LEARN_PHI:
+            approximator.adapt_phi(s, c, dt, x2)
+
+
+@jit
+def follow(s: Any, c: Any, phase: int, dt: float) -> None:
+    """
+    Follow the travel of the stem and collect the settled check's block.
+
+    :param s: state record with the filtered signals x1, x2, u.
+    :param c: settings record.
+    :param phase: phase of the estimator.
+    :param dt: time step [s].
+    """
+    x = s.x1 - c.preload
+    step = settled.track(s, x, c.play)
+    if phase != PHASE_LEARN_PHI or gated(c, x):
+        return
+    s.travel += step
+    if s.elapsed - s.moved < settled.FRESH:
+        left = s.u - s.x1 - c.alpha1 / c.alpha5 * s.x2
+        settled.collect(s, dt / settled.CORRELATION, s.x1, left)

@@ -1,0 +1,170 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Guard against learning a fault: see that the valve stays the same while it is learned.
+
+The force balance of the moving stem, u - x1 - (alpha1/alpha5) x2 = offset + dK x1 + friction s
+with s the direction of motion, is fitted to blocks of the learning time by least squares with
+a weak prior. A block that differs from the first by more than the fits' own uncertainty and
+a tolerance means that stiffness or friction change: what was learned is then thrown away.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from damadics_fd.core.jit import jit
+
+N = 3  # offset, relative change of the stiffness, friction / (K L)
+SUMS = 11  # weight, upper triangle of S, q, square of the left side
+STATE = [('place', 'f8'), ('direction', 'f8'), ('moved', 'i8'), ('travel', 'f8'),
+         ('block', 'f8', (SUMS,)), ('base', 'f8', (SUMS,)), ('block_end', 'i8'),
+         ('compared', 'i8'), ('unsettled', 'i8'), ('distance', 'f8'), ('change', 'f8', (N,))]
+
+CORRELATION = 0.1  # s; samples closer than this count as one
+FRESH = 200_000_000  # ns after its last motion in which the stem counts as moving
+PRIOR = (0.05, 0.05, 0.02)  # standard deviations of offset, dK/K, friction
+SIGMA_MIN = 1e-3  # of K L: model error of the moving stem
+ENOUGH = 8.0  # weight that makes a block comparable, in correlation times
+
+
+@jit
+def track(s: Any, x: float, band: float) -> float:
+    """
+    Follow the stem through a play, so that noise is no travel.
+
+    :param s: state record.
+    :param x: position [1].
+    :param band: half width of the play [1].
+    :return: the travel since the last call [1].
+    """
+    if abs(x - s.place) <= band:
+        return 0.0
+    s.direction = 1.0 if x > s.place else -1.0
+    step = x - s.direction * band - s.place
+    s.place += step
+    s.moved = s.elapsed
+    return abs(step)
+
+
+@jit
+def collect(s: Any, weight: float, x1: float, left: float) -> None:
+    """
+    Add a sample to the block.
+
+    :param s: state record.
+    :param weight: time step / CORRELATION.
+    :param x1: position [1].
+    :param left: u - x1 - (alpha1/alpha5) x2 [1].
+    """
+    b = s.block
+    b[0] += weight
+    b[1] += weight
+    b[2] += weight * x1
+    b[3] += weight * s.direction
+    b[4] += weight * x1 * x1
+    b[5] += weight * x1 * s.direction
+    b[6] += weight
+    b[7] += weight * left
+    b[8] += weight * left * x1
+    b[9] += weight * left * s.direction
+    b[10] += weight * left * left
+
+
+@jit
+def fit(b: Any, theta: Any, cov: Any) -> None:
+    """
+    Fit the force balance to the sums of a block.
+
+    :param b: sums, see `collect`.
+    :param theta: written: offset, dK/K, friction.
+    :param cov: written: their covariance.
+    """
+    sigma = SIGMA_MIN
+    for _ in range(2):  # with the least sigma, then with the one found
+        scale = 1.0 / (sigma * sigma)
+        k = 1
+        for i in range(N):
+            for j in range(i, N):
+                cov[i, j] = cov[j, i] = b[k] * scale
+                k += 1
+            cov[i, i] += 1.0 / (PRIOR[i] * PRIOR[i])
+        invert(cov)
+        left = b[10]
+        for i in range(N):
+            theta[i] = scale * (cov[i, 0] * b[7] + cov[i, 1] * b[8] + cov[i, 2] * b[9])
+        k = 1
+        for i in range(N):
+            left -= 2.0 * theta[i] * b[7 + i]
+            for j in range(i, N):
+                left += (1.0 if i == j else 2.0) * theta[i] * theta[j] * b[k]
+                k += 1
+        sigma = max(SIGMA_MIN, math.sqrt(max(left, 0.0) / max(b[0] - N, 1.0)))
+
+
+@jit
+def invert(a: Any) -> None:
+    """
+    Invert a symmetric positive definite matrix in place by Gauss-Jordan elimination.
+
+    :param a: the matrix.
+    """
+    for p in range(N):
+        pivot = 1.0 / a[p, p]
+        a[p, p] = 1.0
+        for j in range(N):
+            a[p, j] *= pivot
+        for i in range(N):
+            if i != p:
+                factor = a[i, p]
+                a[i, p] = 0.0
+                for j in range(N):
+                    a[i, j] -= factor * a[p, j]
+
+
+@jit
+def compare(s: Any, c: Any) -> None:
+    """
+    Set the distance of the block from the first one, and the change of the parameters.
+
+    :param s: state record: distance, change out.
+    :param c: settings record: what change of offset, stiffness and friction is tolerated.
+    """
+    theta, cov = np.zeros(N), np.zeros((N, N))
+    base, spread = np.zeros(N), np.zeros((N, N))
+    fit(s.base, base, spread)
+    fit(s.block, theta, cov)
+    for i in range(N):
+        s.change[i] = theta[i] - base[i]
+        for j in range(N):
+            cov[i, j] += spread[i, j]
+    cov[0, 0] += c.settled_stiffness * c.settled_stiffness / 4.0
+    cov[1, 1] += c.settled_stiffness * c.settled_stiffness
+    cov[2, 2] += c.settled_friction * c.settled_friction
+    invert(cov)
+    s.distance = 0.0
+    for i in range(N):
+        for j in range(N):
+            s.distance += s.change[i] * cov[i, j] * s.change[j]
+
+
+@jit
+def close_block(s: Any, c: Any) -> bool:
+    """
+    End a block: keep it as the first one or compare it.
+
+    :param s: state record.
+    :param c: settings record.
+    :return: False where the valve has changed.
+    """
+    same = True
+    if s.block[0] >= ENOUGH:
+        if s.base[0] == 0.0:
+            s.base[:] = s.block
+        else:
+            compare(s, c)
+            s.compared += 1
+            same = s.distance <= c.settled_max
+    s.block[:] = 0.0
+    return same
