@@ -2,12 +2,30 @@
 # SPDX-License-Identifier: Apache-2.0
 """The one place that decides how a hot loop is compiled."""
 
+import hashlib
 from collections.abc import Callable
+from functools import lru_cache
+from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from numba import njit
+import numba
 
 F = TypeVar('F', bound=Callable[..., Any])
+settings: Any = numba.config
+
+
+@lru_cache
+def _cache(file: str) -> str:
+    # numba's own cache notices a change of the function's file, but not of the files of the
+    # functions that it calls: a loop would go on with the steps of yesterday. So every state
+    # of a package's sources has a cache of its own.
+    package = Path(file).parent
+    while (package.parent / '__init__.py').exists():
+        package = package.parent
+    digest = hashlib.sha256()
+    for source in sorted(package.rglob('*.py')):
+        digest.update(source.read_bytes())
+    return str(package / '__pycache__' / f'numba-{digest.hexdigest()[:16]}')
 
 
 def jit(function: F) -> F:
@@ -17,4 +35,9 @@ def jit(function: F) -> F:
     :param function: a function of scalars and arrays; its state is a structured array.
     :return: the compiled function. With `NUMBA_DISABLE_JIT=1` the same source runs uncompiled.
     """
-    return cast(F, njit(cache=True, fastmath=False, error_model='numpy')(function))
+    before = settings.CACHE_DIR
+    settings.CACHE_DIR = before or _cache(function.__code__.co_filename)
+    try:
+        return cast(F, numba.njit(cache=True, fastmath=False, error_model='numpy')(function))
+    finally:
+        settings.CACHE_DIR = before

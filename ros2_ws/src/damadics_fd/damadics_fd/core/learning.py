@@ -36,6 +36,7 @@ def forget(s: Any, c: Any) -> None:
     s.compared = 0
     s.block[:] = 0.0
     s.block_end = 0
+    s.drift = 0.0
 
 
 @jit
@@ -70,7 +71,7 @@ def phase_of(s: Any, c: Any) -> int:
     if t < c.t_w:
         return PHASE_LEARN_ALPHA
     if guarded(c) and not settle(s, c):
-        return PHASE_LEARN_PHI
+        return PHASE_LEARN_ALPHA
     if t < c.t_learn or s.travel < c.travel_min or (guarded(c) and s.compared == 0):
         return PHASE_LEARN_PHI
     s.armed = True
@@ -94,10 +95,21 @@ def settle(s: Any, c: Any) -> bool:
     s.block_end += length
     if settled.close_block(s, c):
         return True
+    refuse(s, c)
+    return False
+
+
+@jit
+def refuse(s: Any, c: Any) -> None:
+    """
+    Learn again from the start, because the valve changes while it is learned.
+
+    :param s: state record.
+    :param c: settings record.
+    """
     forget(s, c)
     s.unsettled += 1
-    s.start = s.elapsed - int(c.t_w * 1e9)
-    return False
+    s.start = s.elapsed - int(c.t_on * 1e9)
 
 
 @jit
@@ -169,3 +181,5 @@ def follow(s: Any, c: Any, phase: int, dt: float) -> None:
     if s.elapsed - s.moved < settled.FRESH:
         left = s.u - s.x1 - c.alpha1 / c.alpha5 * s.x2
         settled.collect(s, dt / settled.CORRELATION, s.x1, left)
+        if guarded(c) and settled.strays(s, c, dt, s.x1, left):
+            refuse(s, c)

@@ -6,7 +6,8 @@ Guard against learning a fault: see that the valve stays the same while it is le
 The force balance of the moving stem, u - x1 - (alpha1/alpha5) x2 = offset + dK x1 + friction s
 with s the direction of motion, is fitted to blocks of the learning time by least squares with
 a weak prior. A block that differs from the first by more than the fits' own uncertainty and
-a tolerance means that stiffness or friction change: what was learned is then thrown away.
+a tolerance means that stiffness or friction change; so does a force that leaves the first fit
+by more than the friction itself. What was learned is then thrown away.
 """
 
 import math
@@ -20,12 +21,14 @@ N = 3  # offset, relative change of the stiffness, friction / (K L)
 SUMS = 11  # weight, upper triangle of S, q, square of the left side
 STATE = [('place', 'f8'), ('direction', 'f8'), ('moved', 'i8'), ('travel', 'f8'),
          ('block', 'f8', (SUMS,)), ('base', 'f8', (SUMS,)), ('block_end', 'i8'),
-         ('compared', 'i8'), ('unsettled', 'i8'), ('distance', 'f8'), ('change', 'f8', (N,))]
+         ('compared', 'i8'), ('unsettled', 'i8'), ('distance', 'f8'), ('change', 'f8', (N,)),
+         ('theta', 'f8', (N,)), ('cov', 'f8', (N, N)), ('sigma', 'f8'), ('drift', 'f8')]
 
 CORRELATION = 0.1  # s; samples closer than this count as one
 FRESH = 200_000_000  # ns after its last motion in which the stem counts as moving
 PRIOR = (0.05, 0.05, 0.02)  # standard deviations of offset, dK/K, friction
 SIGMA_MIN = 1e-3  # of K L: model error of the moving stem
+QUICK = 0.5  # s; mean over which a force that leaves the first fit is judged
 ENOUGH = 8.0  # weight that makes a block comparable, in correlation times
 
 
@@ -73,13 +76,14 @@ def collect(s: Any, weight: float, x1: float, left: float) -> None:
 
 
 @jit
-def fit(b: Any, theta: Any, cov: Any) -> None:
+def fit(b: Any, theta: Any, cov: Any) -> float:
     """
     Fit the force balance to the sums of a block.
 
     :param b: sums, see `collect`.
     :param theta: written: offset, dK/K, friction.
     :param cov: written: their covariance.
+    :return: standard deviation of the force from the fit / (K L).
     """
     sigma = SIGMA_MIN
     for _ in range(2):  # with the least sigma, then with the one found
@@ -101,6 +105,7 @@ def fit(b: Any, theta: Any, cov: Any) -> None:
                 left += (1.0 if i == j else 2.0) * theta[i] * theta[j] * b[k]
                 k += 1
         sigma = max(SIGMA_MIN, math.sqrt(max(left, 0.0) / max(b[0] - N, 1.0)))
+    return sigma
 
 
 @jit
@@ -132,13 +137,11 @@ def compare(s: Any, c: Any) -> None:
     :param c: settings record: what change of offset, stiffness and friction is tolerated.
     """
     theta, cov = np.zeros(N), np.zeros((N, N))
-    base, spread = np.zeros(N), np.zeros((N, N))
-    fit(s.base, base, spread)
     fit(s.block, theta, cov)
     for i in range(N):
-        s.change[i] = theta[i] - base[i]
+        s.change[i] = theta[i] - s.theta[i]
         for j in range(N):
-            cov[i, j] += spread[i, j]
+            cov[i, j] += s.cov[i, j]
     cov[0, 0] += c.settled_stiffness * c.settled_stiffness / 4.0
     cov[1, 1] += c.settled_stiffness * c.settled_stiffness
     cov[2, 2] += c.settled_friction * c.settled_friction
@@ -162,9 +165,34 @@ def close_block(s: Any, c: Any) -> bool:
     if s.block[0] >= ENOUGH:
         if s.base[0] == 0.0:
             s.base[:] = s.block
+            s.sigma = fit(s.base, s.theta, s.cov)
         else:
             compare(s, c)
             s.compared += 1
             same = s.distance <= c.settled_max
     s.block[:] = 0.0
     return same
+
+
+@jit
+def strays(s: Any, c: Any, dt: float, x1: float, left: float) -> bool:
+    """
+    Tell whether the force has left the first fit by more than friction and noise explain.
+
+    :param s: state record: drift in and out.
+    :param c: settings record.
+    :param dt: time step [s].
+    :param x1: position [1].
+    :param left: u - x1 - (alpha1/alpha5) x2 [1].
+    :return: True where it has.
+    """
+    if s.base[0] == 0.0:
+        return False
+    d = s.direction
+    error = left - s.theta[0] - s.theta[1] * x1 - s.theta[2] * d
+    s.drift += min(dt / QUICK, 1.0) * (error - s.drift)
+    spread = (s.cov[0, 0] + s.cov[1, 1] * x1 * x1 + s.cov[2, 2]
+              + 2.0 * (s.cov[0, 1] * x1 + s.cov[0, 2] * d + s.cov[1, 2] * x1 * d))
+    noise = 5.0 * s.sigma * math.sqrt(CORRELATION / QUICK) + 4.0 * math.sqrt(max(spread, 0.0))
+    friction = max(s.theta[2], math.sqrt(s.cov[2, 2]), c.settled_friction)
+    return abs(s.drift) > 1.5 * friction + noise
