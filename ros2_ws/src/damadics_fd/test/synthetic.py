@@ -1,6 +1,6 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""A valve computed backwards: the stem moves as told, the pressure follows from the force balance."""
+"""A valve computed backwards: the stem moves as told, its pressure from the force balance."""
 
 import numpy as np
 

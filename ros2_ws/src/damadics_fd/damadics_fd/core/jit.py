@@ -14,18 +14,18 @@ F = TypeVar('F', bound=Callable[..., Any])
 settings: Any = numba.config
 
 
+CORE = Path(__file__).parent
+
+
 @lru_cache
-def _cache(file: str) -> str:
+def _cache(folder: Path) -> str:
     # numba's own cache notices a change of the function's file, but not of the files of the
     # functions that it calls: a loop would go on with the steps of yesterday. So every state
-    # of a package's sources has a cache of its own.
-    package = Path(file).parent
-    while (package.parent / '__init__.py').exists():
-        package = package.parent
+    # of the sources has a cache of its own.
     digest = hashlib.sha256()
-    for source in sorted(package.rglob('*.py')):
+    for source in sorted({*CORE.rglob('*.py'), *folder.rglob('*.py')}):
         digest.update(source.read_bytes())
-    return str(package / '__pycache__' / f'numba-{digest.hexdigest()[:16]}')
+    return str(folder / '__pycache__' / f'numba-{digest.hexdigest()[:16]}')
 
 
 def jit(function: F) -> F:
@@ -36,7 +36,7 @@ def jit(function: F) -> F:
     :return: the compiled function. With `NUMBA_DISABLE_JIT=1` the same source runs uncompiled.
     """
     before = settings.CACHE_DIR
-    settings.CACHE_DIR = before or _cache(function.__code__.co_filename)
+    settings.CACHE_DIR = before or _cache(Path(function.__code__.co_filename).parent)
     try:
         return cast(F, numba.njit(cache=True, fastmath=False, error_model='numpy')(function))
     finally:
