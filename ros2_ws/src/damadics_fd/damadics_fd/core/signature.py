@@ -23,7 +23,7 @@ from damadics_fd.core.signature_decision import (
     start_supply_alarm,
     watch,
 )
-from damadics_fd.core.signature_evidence import accumulate, residual
+from damadics_fd.core.signature_evidence import accumulate, growth_time, residual
 from damadics_fd.core.signature_reference import (
     finish_learning,
     learn_block,
@@ -41,6 +41,8 @@ from damadics_fd.core.signature_types import (
     REFERENCE_DTYPE,
     SET_ALARM,
     SET_SLOW,
+    SIGN,
+    SIGN_T,
     STATE_ALARM,
     STATE_DTYPE,
     STATE_INSUFFICIENT,
@@ -48,6 +50,8 @@ from damadics_fd.core.signature_types import (
     STATE_MONITOR,
     STATE_UNAVAILABLE,
     STATE_VERIFY,
+    X1,
+    X1_T,
     SignatureSettings,
     known,
     settings_record,
@@ -246,6 +250,9 @@ def monitor_block(s: Any, c: Any) -> None:
         accumulate(s, m, 1.0 - 1.0 / c.memory[m], r)
     s.n_moving += 1
     if s.state == STATE_ALARM:
+        tau = growth_time(s)
+        s.ph[SIGN_T] = s.ph[SIGN] * tau
+        s.ph[X1_T] = s.ph[X1] * tau
         accumulate(s, SET_ALARM, 1.0 - 1.0 / c.memory[SET_ALARM], r)
         decide(s, c)
         return

@@ -18,8 +18,10 @@ from damadics_fd.core.signature_types import (
     POS,
     POSX,
     SIGN,
+    SIGN_T,
     TABLE,
     X1,
+    X1_T,
     G,
     V,
 )
@@ -164,6 +166,8 @@ def regressor(s: Any, c: Any) -> None:
     i, share = table_node(x)
     ph[TABLE + i] = (1.0 - share) * dp * gain
     ph[TABLE + i + 1] = share * dp * gain
+    ph[SIGN_T] = 0.0
+    ph[X1_T] = 0.0
     ph[PB] = s.bp[1]
     ph[G] = MPA * gain
     ph[POS] = -(s.theta[X1] + slope)

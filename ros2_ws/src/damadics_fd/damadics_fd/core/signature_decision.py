@@ -42,7 +42,8 @@ from damadics_fd.core.signature_types import (
 SECOND = 1_000_000_000  # [ns]
 FULL_EVIDENCE = 18.0  # blocks since the alarm, from which the fast set holds nothing older
 NULL_MOVING = 12.0  # blocks since the alarm
-NULL_STICK = 1.3  # stick range / reference
+NULL_STICK = 1.5  # stick range / reference
+FLIP = 10  # evaluated blocks in a row that overturn a firm family
 P_STICK = 0.96
 P_SUPPLY = 0.95
 STAGE2_EVIDENCE = 30.0
@@ -199,9 +200,9 @@ def decide(s: Any, c: Any) -> None:
         p_f = math.exp(s.logp[m][FRICTION])
         s.run_f = s.run_f + 1 if p_f > c.p_firm else 0
         s.run_e = s.run_e + 1 if 1.0 - p_f > c.p_firm else 0
-        if s.run_f >= c.n_firm:
+        if s.run_f >= (FLIP if s.family == FAMILY_ELASTIC else c.n_firm):
             s.family = FAMILY_FRICTION
-        elif s.run_e >= c.n_firm:
+        elif s.run_e >= (FLIP if s.family == FAMILY_FRICTION else c.n_firm):
             s.family = FAMILY_ELASTIC
         if s.family == FAMILY_FRICTION and p_f > 0.5:
             name_friction(s, m, p_f)

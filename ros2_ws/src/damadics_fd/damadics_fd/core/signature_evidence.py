@@ -25,16 +25,20 @@ from damadics_fd.core.signature_types import (
     POSITION_GAIN,
     PRELOAD,
     PRESSURE_GAIN,
+    SET_ALARM,
     SIGN,
+    SIGN_T,
     SPRING,
     TABLE,
     X1,
+    X1_T,
     V,
 )
 
-# column of hypotheses 2 to 7: x1, 1, position gain, chamber pressure, P1 - P2, position offset
-COLUMN = np.array([-1, -1, X1, ONE, N_REF + 3, N_REF, N_REF + 1, N_REF + 2])
+# column of hypotheses 3 to 7: 1, position gain, chamber pressure, P1 - P2, position offset
+COLUMN = np.array([-1, -1, -1, ONE, N_REF + 3, N_REF, N_REF + 1, N_REF + 2])
 MIN_EVIDENCE = 4.0  # blocks
+CONFLICT = 3.0  # log odds of the moving stem against friction that outweigh the stick range
 SMALL = 2e-3  # [1] tolerance of the exclusions
 
 
@@ -158,6 +162,71 @@ def cross_information(s: Any, m: int, iv: float, i: int, j: int) -> float:
 
 
 @jit
+def growth_time(s: Any) -> float:
+    """
+    Return the time that growing changes are counted in.
+
+    :param s: state record.
+    :return: [10 s] since the alarm, at most 3.
+    """
+    since = (s.t - s.alarm_t) * 1e-10
+    return max(0.0, min(3.0, since))
+
+
+@jit
+def solve_group(
+    s: Any, c: Any, m: int, iv: float, columns: tuple[int, int, int], count: int,
+    prior: tuple[float, float, float],
+) -> float:
+    """
+    Fit the columns of one hypothesis.
+
+    :param s: state record; the changes d and their covariance H are written.
+    :param c: settings record.
+    :param m: index of the set.
+    :param iv: 1 / variance of a block.
+    :param columns: of the regressor; the first `count` of them are used.
+    :param count: number of columns.
+    :param prior: standard deviation of each change.
+    :return: misfit that the hypothesis explains.
+    """
+    for i in range(count):
+        s.H[i, i] = s.Gm[columns[i], columns[i]] + 1.0 / (prior[i] * prior[i])
+        for j in range(i):
+            s.H[i, j] = cross_information(s, m, iv, columns[i], columns[j])
+    s.d[:] = 0.0
+    if not inverse(s.H[:count, :count], s.W[:count, :count]):
+        return 0.0
+    explained = 0.0
+    for i in range(count):
+        for j in range(count):
+            s.d[i] += s.H[i, j] * s.gv[columns[j]]
+        explained += s.d[i] * s.gv[columns[i]]
+    return explained
+
+
+@jit
+def combine(s: Any, count: int, a: float, b: float, scale: float) -> tuple[float, float]:
+    """
+    Return the change d0 + a d1 + b d2 of the last group in units of `scale`.
+
+    :param s: state record after `solve_group`.
+    :param count: number of columns.
+    :param a: weight of the second column.
+    :param b: weight of the third column.
+    :param scale: unit.
+    :return: value and standard deviation.
+    """
+    weight = (1.0, a, b)
+    value, variance = 0.0, 0.0
+    for i in range(count):
+        value += weight[i] * s.d[i]
+        for j in range(count):
+            variance += weight[i] * weight[j] * s.H[i, j]
+    return value / scale, math.sqrt(max(variance, 0.0)) / scale
+
+
+@jit
 def evaluate(s: Any, c: Any, m: int, eps: float, b_r: float, b_p: float) -> float:
     """
     Weigh the hypotheses on one set (2.5).
@@ -181,43 +250,45 @@ def evaluate(s: Any, c: Any, m: int, eps: float, b_r: float, b_p: float) -> floa
         return 0.0
     logp, value, std = s.logp[m], s.value[m], s.sd[m]
     logp[0] = J_0  # first the misfits J_h
+    now = growth_time(s)
     # friction: dry and viscous part together
-    a = s.Gm[SIGN, SIGN] + 1.0 / (c.change_std[1] * c.change_std[1])
-    b = cross_information(s, m, iv, SIGN, V)
-    d = s.Gm[V, V] + 1.0 / (c.change_std[0] * c.change_std[0])
-    det = a * d - b * b
-    d_s = (d * s.gv[SIGN] - b * s.gv[V]) / det
-    d_v = (a * s.gv[V] - b * s.gv[SIGN]) / det
+    count = 3 if m == SET_ALARM else 2
+    explained = solve_group(s, c, m, iv, (SIGN, V, SIGN_T), count,
+                            (c.change_std[1], c.change_std[0], c.growth_std[0]))
     v_mean = s.vb[m] / ne
     scale = max(s.theta[SIGN] + s.theta[V] * v_mean, 1e-3)
-    value[FRICTION] = (d_s + d_v * v_mean) / scale
-    std[FRICTION] = math.sqrt((d - 2.0 * b * v_mean + a * v_mean * v_mean) / det) / scale
-    logp[FRICTION] = J_0 - d_s * s.gv[SIGN] - d_v * s.gv[V]
+    logp[FRICTION] = J_0 - explained
+    value[FRICTION], std[FRICTION] = combine(s, count, v_mean, now, scale)
     if value[FRICTION] < -1.3 - SMALL / scale:
         logp[FRICTION] = J_0  # friction cannot become negative
-    for h in range(SPRING, N_HYP):
+    # spring
+    explained = solve_group(s, c, m, iv, (X1, X1_T, V), count - 1,
+                            (c.change_std[2], c.growth_std[1], 1.0))
+    logp[SPRING] = J_0 - explained
+    value[SPRING], std[SPRING] = combine(s, count - 1, now, 0.0, s.theta[X1])
+    if value[SPRING] < -1.05:
+        logp[SPRING] = J_0
+    for h in range(PRELOAD, N_HYP):
         k = COLUMN[h]
         info = s.Gm[k, k] + 1.0 / (c.change_std[h] * c.change_std[h])
         value[h] = s.gv[k] / info
         std[h] = 1.0 / math.sqrt(info)
         logp[h] = J_0 - s.gv[k] * value[h]
-    value[SPRING] /= s.theta[X1]
-    std[SPRING] /= s.theta[X1]
-    if value[SPRING] < -1.05:
-        logp[SPRING] = J_0
     J_min = logp[0]
     for h in range(1, N_HYP):
         J_min = min(J_min, logp[h])
     sc = max(1.0, J_min / max(ne - 2.0, 1.0))
+    # misfits to log posteriors, normalised over h >= 1
+    for h in range(1, N_HYP):
+        logp[h] = math.log(c.prior[h]) - logp[h] / (2.0 * sc)
+    logp[FRICTION] -= 0.5 * math.log(ne)
+    if logp[SPRING:].max() - logp[FRICTION] > CONFLICT:
+        b_r = 0.0  # a growing spring change widens the stick range too
     D: float = (J_0 - J_min) / sc + 2.0 * b_r
     s.D[m] = D
-    # misfits to log posteriors, normalised over h >= 1
-    top = -1e300
-    for h in range(1, N_HYP):
-        logp[h] = math.log(c.prior[h]) - logp[h] / (2.0 * sc) + (b_r if h == FRICTION else b_p)
-        if h == FRICTION:
-            logp[h] -= 0.5 * math.log(ne)
-        top = max(top, logp[h])
+    logp[FRICTION] += b_r
+    logp[SPRING:] += b_p
+    top = logp[1:].max()
     total = 0.0
     for h in range(1, N_HYP):
         total += math.exp(logp[h] - top)

@@ -22,7 +22,8 @@ X1, ONE, V, SIGN = 0, 1, 2, 3  # stiffness, preload, viscous friction, dry frict
 TABLE = 4  # first of the plug force corrections
 N_REF = TABLE + N_TABLE  # columns of the reference model
 PB, G, POS, POSX = N_REF, N_REF + 1, N_REF + 2, N_REF + 3
-N_COL = N_REF + 4
+SIGN_T, X1_T = N_REF + 4, N_REF + 5  # the same as SIGN and X1, growing with time
+N_COL = N_REF + 6
 
 # -- accumulators ---------------------------------------------------------------------------
 SET_FAST, SET_MID, SET_SLOW, SET_ALARM = 0, 1, 2, 3
@@ -108,6 +109,7 @@ class SignatureSettings:
     # evidence (2.4, 2.5)
     memory: tuple[float, float, float, float] = (6.0, 30.0, 300.0, 30.0)
     change_std: tuple[float, ...] = (0.5, 0.2, 1.0, 0.2, 0.3, 0.3, 0.3, 0.1)  # v s | h = 2..7
+    growth_std: tuple[float, float] = (0.3, 1.0)  # friction, spring: change in 10 s
     prior: tuple[float, ...] = (1.0, 0.45, 0.45, 0.02, 0.02, 0.02, 0.02, 0.02)
     model_error: float = 0.2  # eps
     model_error_stage2: float = 0.03
@@ -258,7 +260,8 @@ STATE_DTYPE = _record(
         ('air_rate', 'f8', (2,)), ('air_rate_ps', 'f8', (2,)),
         # work space of the compiled functions
         ('L', 'f8', (N_REF, N_REF)), ('Y', 'f8', (N_REF, N_COL)), ('y0', 'f8', (N_REF,)),
-        ('Gm', 'f8', (N_COL, N_COL)), ('gv', 'f8', (N_COL,)),
+        ('Gm', 'f8', (N_COL, N_COL)), ('gv', 'f8', (N_COL,)), ('H', 'f8', (3, 3)),
+        ('W', 'f8', (3, 3)), ('d', 'f8', (3,)),
     ]
 )
 
