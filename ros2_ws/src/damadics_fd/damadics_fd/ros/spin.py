@@ -40,9 +40,10 @@ def spin(make_node: Callable[[], SpinnableNode], args: list[str] | None = None) 
         print(problem, file=sys.stderr)
         rclpy.try_shutdown()
         return 1
-    except Exception:
-        if rclpy.ok():
+    except (KeyboardInterrupt, Exception) as problem:
+        if rclpy.ok() and not isinstance(problem, KeyboardInterrupt):
             raise
+        rclpy.try_shutdown()
         return 0  # a signal came while the node was starting
     executor = EventsExecutor()
     executor.add_node(node)
