@@ -1,0 +1,61 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+import socket
+
+import pytest
+from damadics_bringup.processes import (
+    Processes,
+    ProcessError,
+    executable,
+    free_domain,
+    parameters,
+)
+
+
+def test_parameters_are_written_as_ros_takes_them():
+    assert parameters(mode='paper', rate=400.0, noise=True) == [
+        '--ros-args', '-p', 'mode:=paper', '-p', 'rate:=400.0', '-p', 'noise:=true',
+    ]
+
+
+def test_a_missing_executable_names_the_remedy():
+    with pytest.raises(ProcessError, match='run make build'):
+        executable('damadics_fd', 'no_such_node')
+    with pytest.raises(ProcessError, match='run make build'):
+        executable('no_such_package', 'detector')
+
+
+def test_a_domain_in_use_is_not_chosen():
+    first = free_domain()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as held:
+        held.bind(('', 7400 + 250 * first))
+        assert first not in {free_domain() for _ in range(400)}
+
+
+def script(tmp_path, monkeypatch, text):
+    """Make a shell script the executable that Processes starts."""
+    path = tmp_path / 'script'
+    path.write_text(text)
+    path.chmod(0o755)
+    monkeypatch.setattr('damadics_bringup.processes.executable', lambda package, name: path)
+
+
+def test_a_process_that_fails_is_reported_with_its_output(tmp_path, monkeypatch):
+    script(tmp_path, monkeypatch, '#!/bin/sh\necho the valve is gone\nexit 5\n')
+    with Processes(tmp_path / 'logs') as processes:
+        processes.start('any', 'failing')
+        while not processes.ended('failing'):
+            pass
+        with pytest.raises(ProcessError, match=r'(?s)exit code 5.*the valve is gone'):
+            processes.end('failing')
+
+
+def test_a_process_that_ignores_signals_is_killed(tmp_path, monkeypatch):
+    script(tmp_path, monkeypatch, '#!/bin/bash\ntrap "" INT\necho ready\nsleep 60\n')
+    with Processes(tmp_path / 'logs') as processes:
+        processes.start('any', 'stubborn')
+        while 'ready' not in processes.log('stubborn').read_text():
+            pass
+        with pytest.raises(ProcessError, match='did not end within'):
+            processes.end('stubborn', patience=0.3)
+        assert processes.ended('stubborn')
