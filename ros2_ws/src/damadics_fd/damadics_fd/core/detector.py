@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damadics_fd.core import alarm, decision, signature
-from damadics_fd.core.estimator import ESTIMATE, Estimate
+from damadics_fd.core.estimation import ESTIMATE, Estimate
 from damadics_fd.core.events import Event, events_of
 from damadics_fd.core.jit import jit
 from damadics_fd.core.modes import PHASE_HOLD, PHASE_PAPER

@@ -2,202 +2,27 @@
 # SPDX-License-Identifier: Apache-2.0
 """The estimator: one measurement in, one estimate out."""
 
-from typing import Any, NamedTuple
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from damadics_fd.core import approximator, force, learning, quality, velocity
-from damadics_fd.core.jit import jit
-from damadics_fd.core.modes import MONITOR, PAPER, PHASE_PAPER, PHASES
+from damadics_fd.core import quality
+from damadics_fd.core.estimation import (
+    ESTIMATE,
+    LEARNED,
+    STATE,
+    Estimate,
+    progress,
+    start,
+    take_up,
+    update,
+)
+from damadics_fd.core.modes import PHASE_HOLD, PHASE_MONITOR, PHASE_PAPER, PHASES
 from damadics_fd.core.settings import Settings
 
-SUBSTEPS = 1000  # at most, in one gap
-LARGEST_K2_DT = 1.5  # step of the printed observer, which is unstable from 2.8 on
-ESTIMATE = np.dtype((np.record, np.dtype([
-    ('stamp', 'i8'), ('x2', 'f8'), ('x1_hat', 'f8'), ('x2_hat', 'f8'), ('xi1', 'f8'),
-    ('xi2', 'f8'), ('phi', 'f8'), ('alpha1', 'f8'), ('alpha4', 'f8'), ('alpha5', 'f8'),
-    ('x1', 'f8'), ('u', 'f8'), ('ps', 'f8'), ('dp', 'f8'), ('progress', 'f8'), ('phase', 'i8'),
-])))
-STATE = np.dtype((np.record, np.dtype([
-    *learning.STATE, *velocity.STATE, *approximator.STATE,
-], align=True)))
-
-
-class Estimate(NamedTuple):
-    """Hold one result of the estimator, with the fields of damadics_msgs/Estimate."""
-
-    stamp: int  # ns
-    x2: float
-    x1_hat: float
-    x2_hat: float
-    xi1: float
-    xi2: float
-    phi: float
-    alpha1: float
-    alpha4: float
-    alpha5: float
-    x1: float
-    u: float
-    ps: float
-    dp: float
-    progress: float
-    phase: int
-
-    @property
-    def alpha_hat(self) -> tuple[float, float, float]:
-        """
-        Return the estimates of alpha1, alpha4, alpha5.
-
-        :return: [1/s, 1/s2, 1/s2].
-        """
-        return self.alpha1, self.alpha4, self.alpha5
-
-
-@jit
-def advance(s: Any, c: Any, phase: int, dt: float, x1_0: float, x2_0: float, u_0: float,
-            x1: float, x2: float, u: float) -> None:
-    """
-    Advance observer and, where the phase allows it, adaptation by one step.
-
-    :param s: state record.
-    :param c: settings record.
-    :param phase: phase of the estimator.
-    :param dt: time step [s].
-    :param x1_0: position at the start of the step, filtered [1].
-    :param x2_0: velocity there [1/s].
-    :param u_0: input there, filtered [1].
-    :param x1: position at the end of the step, filtered [1].
-    :param x2: velocity there [1/s].
-    :param u: input there, filtered [1].
-    """
-    if phase == PHASE_PAPER:
-        approximator.observe_printed(s, c, dt, x1_0, x2_0, u_0, x1, x2, u)
-    else:
-        approximator.observe(s, c, dt, x1, x2, u)
-    learning.adapt(s, c, phase, dt, x1, x2, u)
-
-
-@jit
-def step(q: Any, s: Any, c: Any, e: Any, stamp: int, cv: float, x1: float, p1: float, p2: float,
-         t1: float, flow: float, ps: float) -> int:
-    """
-    Take one sample.
-
-    :param q: quality record.
-    :param s: state record; untouched where the sample is refused.
-    :param c: settings record.
-    :param e: estimate record, written where the sample is accepted.
-    :param stamp: stamp [ns].
-    :param cv: control value [1].
-    :param x1: stem position [1].
-    :param p1: pressure before the valve [Pa].
-    :param p2: pressure behind the valve [Pa].
-    :param t1: temperature of the medium [degC].
-    :param flow: flow [kg/s].
-    :param ps: chamber pressure, gauge [Pa].
-    :return: quality.ACCEPTED or the reason of refusal.
-    """
-    reason = quality.check_values(c, cv, x1, p1, p2, t1, flow, ps)
-    if reason == quality.ACCEPTED:
-        reason = quality.check_stamp(q, c, stamp)
-    first = q.counts[quality.ACCEPTED] == 0
-    dt = quality.admit(q, c, stamp, reason)
-    if reason != quality.ACCEPTED:
-        return reason
-
-    y = x1 + c.preload
-    afresh = dt < 0.0
-    if afresh:
-        dt = -dt
-        velocity.restart(s, y)
-        approximator.restart(s, y)
-        if first:
-            s.place = x1
-        if s.armed or not first:
-            s.held_until = s.elapsed + int(c.hold * 1e9)
-    else:
-        s.elapsed += int(dt * 1e9 + 0.5)
-    x1_before, x2_before, u_before = s.x1, s.x2, s.u
-    smooth = velocity.filter_position(s, c, dt, y)
-    u = cv
-    if c.mode == MONITOR:
-        u = force.force_input(c, smooth - c.preload, p1, p2, ps)
-    if afresh:
-        velocity.restart_input(s, u)
-    velocity.filter_input(s, c, dt, u)
-
-    if afresh:  # there is no step before the first sample
-        x1_before, x2_before, u_before = s.x1, s.x2, s.u
-        dt = 0.0 if c.mode == PAPER else dt
-
-    phase = learning.phase_of(s, c)
-    parts = max(1, int(dt * c.sample_rate / 1.5) + 1)
-    if c.mode == PAPER:
-        parts = max(parts, int(dt * c.k2 / LARGEST_K2_DT) + 1)
-    parts = min(parts, SUBSTEPS)
-    x1_0, x2_0, u_0 = x1_before, x2_before, u_before
-    for i in range(1, parts + 1):  # a gap is bridged on straight lines between filtered signals
-        part = i / parts
-        x1_1 = x1_before + part * (s.x1 - x1_before) if i < parts else s.x1
-        x2_1 = x2_before + part * (s.x2 - x2_before) if i < parts else s.x2
-        u_1 = u_before + part * (s.u - u_before) if i < parts else s.u
-        advance(s, c, phase, dt / parts, x1_0, x2_0, u_0, x1_1, x2_1, u_1)
-        x1_0, x2_0, u_0 = x1_1, x2_1, u_1
-
-    learning.follow(s, c, phase, dt)
-
-    e.stamp = stamp
-    e.x2 = s.x2
-    e.x1_hat = s.xh1
-    e.x2_hat = s.xh2
-    e.xi1 = s.xi1
-    e.xi2 = s.xi2
-    e.phi = s.phi
-    e.alpha1 = s.ah1
-    e.alpha4 = s.ah4
-    e.alpha5 = s.ah5
-    e.x1 = x1
-    e.u = u
-    e.ps = ps
-    e.dp = p1 - p2
-    e.progress = learning.progress_of(s, c)
-    e.phase = phase
-    return reason
-
-
-@jit
-def update(q: NDArray, s: NDArray, c: NDArray, e: NDArray, stamp: int, cv: float, x1: float,
-           p1: float, p2: float, t1: float, flow: float, ps: float) -> int:
-    """
-    Take one sample; `step` for arrays of length 1, to be called from Python.
-
-    :param q: quality state.
-    :param s: estimator state.
-    :param c: settings.
-    :param e: estimate.
-    :param stamp: stamp [ns].
-    :param cv: control value [1].
-    :param x1: stem position [1].
-    :param p1: pressure before the valve [Pa].
-    :param p2: pressure behind the valve [Pa].
-    :param t1: temperature of the medium [degC].
-    :param flow: flow [kg/s].
-    :param ps: chamber pressure, gauge [Pa].
-    :return: quality.ACCEPTED or the reason of refusal.
-    """
-    return step(q[0], s[0], c[0], e[0], stamp, cv, x1, p1, p2, t1, flow, ps)
-
-
-@jit
-def start(s: NDArray, c: NDArray) -> None:
-    """
-    Set an estimator state to "nothing learned".
-
-    :param s: estimator state.
-    :param c: settings.
-    """
-    learning.forget(s[0], c[0])
+STILL = 600.0  # s without motion after which the status says so
 
 
 class Estimator:
@@ -273,7 +98,108 @@ class Estimator:
 
         :return: a name out of `modes.PHASES`.
         """
-        return PHASES[int(self._estimate[0].phase)]
+        return PHASES[int(self.state[0].phase)]
+
+    @property
+    def status(self) -> str:
+        """
+        Say in one line what the estimator does and, where it learns for long, why.
+
+        :return: for people; never "monitoring" while it does not monitor.
+        """
+        s, c = self.state[0], self.settings
+        if self.quality[0].counts[quality.ACCEPTED] == 0:
+            return 'waiting for the first good sample'
+        if s.phase == PHASE_HOLD:
+            return 'on hold: the input was interrupted, the filters settle'
+        still = (s.elapsed - s.moved) * 1e-9
+        if s.phase in (PHASE_PAPER, PHASE_MONITOR):
+            if still > STILL:
+                return (f'monitoring limited, no excitation: the stem has not moved for '
+                        f'{still:.0f} s, a change of its friction cannot be seen')
+            return 'monitoring'
+        share = f'learning, {100.0 * progress(self.state, self._settings):.0f} %'
+        if s.unsettled:
+            return (f'{share}: learning was refused {int(s.unsettled)} times because the valve '
+                    f'changed meanwhile ({self._change()}); inspect it, then learn anew')
+        late = (s.elapsed - s.start) * 1e-9 >= c.t_learn
+        if late:
+            return (f'{share}: insufficient excitation, {float(s.travel):.2f} of '
+                    f'{c.travel_min:.2f} strokes travelled; move the valve both ways')
+        return share
+
+    @property
+    def monitoring(self) -> bool:
+        """
+        Tell whether decisions count.
+
+        :return: True in the phases `monitor` and `paper`.
+        """
+        return self.state[0].phase in (PHASE_PAPER, PHASE_MONITOR)
+
+    def learned(self) -> dict[str, Any]:
+        """
+        Return what was learned, to be kept over a restart.
+
+        :return: plain numbers and lists by name, fit for JSON.
+        :raises ValueError: where learning is not finished.
+        """
+        if not self.state[0].armed:
+            raise ValueError(f'nothing to save: {self.status}')
+        return {name: self.state[name][0].tolist() for name in LEARNED}
+
+    def restore(self, learned: Mapping[str, Any]) -> None:
+        """
+        Take up what `learned` returned and go to MONITOR as soon as the filters have settled.
+
+        :param learned: what was learned.
+        :raises ValueError: where it is not that, or beyond the bounds of the settings; the
+            estimator is then untouched.
+        """
+        state = self.state.copy()
+        wrong = sorted(set(learned) ^ set(LEARNED))
+        if wrong:
+            raise ValueError(f'learned state: {", ".join(wrong)} missing or unknown')
+        for name, value in learned.items():
+            try:
+                array = np.asarray(value, float)
+            except (TypeError, ValueError, OverflowError) as error:
+                raise ValueError(f'learned state: {name} = {value!r}: {error}') from error
+            if array.shape != state[name].shape[1:] or not np.isfinite(array).all():
+                raise ValueError(f'learned state: {name} = {value!r} does not fit')
+            state[name][0] = array
+        self._check_bounds(state)
+        take_up(state)
+        self.state[:] = state
+
+    def relearn(self, after_repair: bool = False) -> None:
+        """
+        Learn anew; filters and counters go on.
+
+        :param after_repair: take the valve as it is now for fault-free; else what is learned has
+            to agree with the first block that was ever learned or loaded.
+        """
+        if after_repair:
+            self.state['base'] = 0.0
+        self.state['unsettled'] = 0
+        self.state['start'] = self.state['elapsed']
+        start(self.state, self._settings)
+
+    def _check_bounds(self, state: NDArray[Any]) -> None:
+        s, c = state[0], self.settings
+        for name, nominal in (('ah1', c.alpha1), ('ah4', c.alpha4), ('ah5', c.alpha5)):
+            if abs(s[name] - nominal) > c.band * nominal * (1.0 + 1e-9):
+                raise ValueError(f'learned state: {name} = {float(s[name]):g} is not within '
+                                 f'{100.0 * c.band:g} % of {nominal:g}')
+        square = np.sum(s.w1**2) + np.sum(s.w2**2) + s.eps1**2 + s.b1**2
+        if square > (c.w_max * (1.0 + 1e-9))**2:
+            raise ValueError(f'learned state: the weights exceed w_max = {c.w_max:g}')
+
+    def _change(self) -> str:
+        offset, stiffness, friction = self.state[0].change
+        force = self.settings.stiffness * self.settings.stroke
+        return (f'friction {friction * force:+.0f} N, stiffness {100.0 * stiffness:+.1f} %, '
+                f'offset {offset * force:+.0f} N')
 
     def _explain(self, reason: int, stamp: int, values: tuple[float, ...]) -> str:
         name = quality.REASONS[reason]

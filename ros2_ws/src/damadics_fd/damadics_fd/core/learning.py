@@ -19,7 +19,7 @@ from damadics_fd.core.modes import (
 STATE = [('elapsed', 'i8'),  # ns since the first sample, gaps that restart the filters left out
          ('start', 'i8'),  # elapsed time at which learning began
          ('held_until', 'i8'),  # elapsed time at which the filters have settled after a restart
-         ('armed', '?'), *settled.STATE]
+         ('armed', '?'), ('phase', 'i8'), *settled.STATE]
 
 
 @jit
@@ -37,6 +37,18 @@ def forget(s: Any, c: Any) -> None:
     s.block[:] = 0.0
     s.block_end = 0
     s.drift = 0.0
+
+
+@jit
+def arm(s: Any) -> None:
+    """
+    Monitor from now on with what the state has learned.
+
+    :param s: state record.
+    """
+    s.armed = True
+    s.unsettled = 0
+    s.block[:] = 0.0
 
 
 @jit

@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damadics_fd.core import detector as detecting
-from damadics_fd.core import estimator as estimating
+from damadics_fd.core import estimation
 from damadics_fd.core.alarm import RAISED
 from damadics_fd.core.detector import DECISION, Detector
-from damadics_fd.core.estimator import ESTIMATE, Estimator
+from damadics_fd.core.estimation import ESTIMATE
+from damadics_fd.core.estimator import Estimator
 from damadics_fd.core.events import Event, events_of
 from damadics_fd.core.jit import jit
 from damadics_fd.core.quality import SIGNALS
@@ -100,7 +101,7 @@ def loop(q: NDArray, s: NDArray, ds: NDArray, c: NDArray, g: NDArray, gc: NDArra
     :param decisions: written; rows of refused samples stay as they are.
     """
     for i in range(len(stamp)):
-        reason[i] = estimating.step(q[0], s[0], c[0], estimates[i], stamp[i], cv[i], x1[i], p1[i],
+        reason[i] = estimation.step(q[0], s[0], c[0], estimates[i], stamp[i], cv[i], x1[i], p1[i],
                                     p2[i], t1[i], flow[i], ps[i])
         if reason[i] == 0:
             detecting.step(ds[0], c[0], g[0], gc[0], estimates[i], decisions[i])

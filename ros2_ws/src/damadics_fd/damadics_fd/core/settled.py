@@ -195,4 +195,9 @@ def strays(s: Any, c: Any, dt: float, x1: float, left: float) -> bool:
               + 2.0 * (s.cov[0, 1] * x1 + s.cov[0, 2] * d + s.cov[1, 2] * x1 * d))
     noise = 5.0 * s.sigma * math.sqrt(CORRELATION / QUICK) + 4.0 * math.sqrt(max(spread, 0.0))
     friction = max(s.theta[2], math.sqrt(s.cov[2, 2]), c.settled_friction)
-    return abs(s.drift) > 1.5 * friction + noise
+    if abs(s.drift) <= 1.5 * friction + noise:
+        return False
+    s.change[0] = s.drift
+    s.change[1] = 0.0
+    s.change[2] = 0.0
+    return True
