@@ -15,10 +15,13 @@ from damadics_fd.core.signature_types import (
     PB,
     POS,
     POSX,
+    SET_ALARM,
     SET_MID,
     SIGN,
+    SIGN_T,
     STATE_DTYPE,
     X1,
+    X1_T,
     G,
     SignatureSettings,
     V,
@@ -82,8 +85,12 @@ def reference_posterior(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarra
     return theta, np.linalg.inv(cov)
 
 
-def specification(phi, w, v, r, forget, theta, J0, eps, b_r, b_p):
-    """Section 2.5, with full normal equations and a general solver."""
+def specification(phi, w, v, r, forget, theta, J0, eps, b_r, b_p, tau=None):
+    """Section 2.5, with full normal equations and a general solver; tau: growing changes."""
+    columns, widths = dict(COLUMNS), dict(WIDTH)
+    if tau is not None:
+        columns[1], widths[1] = [SIGN, V, SIGN_T], [0.2, 0.5, 0.3]
+        columns[2], widths[2] = [X1, X1_T], [1.0, 1.0]
     weight = w * forget ** np.arange(len(w))[::-1]
     S = (phi * weight[:, None]).T @ phi
     q = phi.T @ (weight * r)
@@ -92,14 +99,14 @@ def specification(phi, w, v, r, forget, theta, J0, eps, b_r, b_p):
     iv = 1.0 / (SIGMA**2 * sc1)
     J, change, std = np.zeros(N_HYP), {}, {}
     for h in range(N_HYP):
-        T = COLUMNS.get(h, [])
+        T = columns.get(h, [])
         A = np.zeros((N_COL, N_REF + len(T)))
         A[np.arange(N_REF), np.arange(N_REF)] = 1.0
         for k, column in enumerate(T):
             A[column, N_REF + k] = 1.0
         H = iv * A.T @ S @ A
         H[:N_REF, :N_REF] += J0
-        for k, width in enumerate(WIDTH.get(h, [])):
+        for k, width in enumerate(widths.get(h, [])):
             H[N_REF + k, N_REF + k] += width**-2
         g = iv * A.T @ q
         sol = np.linalg.solve(H, g)
@@ -107,21 +114,26 @@ def specification(phi, w, v, r, forget, theta, J0, eps, b_r, b_p):
         change[h], std[h] = sol[N_REF:], np.linalg.inv(H)[N_REF:, N_REF:]
     vm = vb / ne
     scale = theta[SIGN] + theta[V] * vm
-    dF = (change[1][0] + change[1][1] * vm) / scale
-    dF_std = np.sqrt(np.array([1, vm]) @ std[1] @ np.array([1, vm])) / scale
+    a = np.array([1.0, vm] if tau is None else [1.0, vm, tau])
+    b = np.array([1.0] if tau is None else [1.0, tau])
+    dF = a @ change[1] / scale
+    dF_std = np.sqrt(a @ std[1] @ a) / scale
     if dF < -1.3:
         J[1] = J[0]
-    dK = change[2][0] / theta[X1]
+    dK = b @ change[2] / theta[X1]
     if dK < -1.05:
         J[2] = J[0]
     sc = max(1.0, J.min() / max(ne - 2.0, 1.0))
-    D = (J[0] - J.min()) / sc + 2.0 * b_r
     logp = np.log(PRIOR) - J / (2.0 * sc)
-    logp[1] += b_r - 0.5 * np.log(ne)
+    logp[1] -= 0.5 * np.log(ne)
+    if logp[2:].max() - logp[1] > 3.0:  # the moving stem contradicts the stick range
+        b_r = 0.0
+    D = (J[0] - J.min()) / sc + 2.0 * b_r
+    logp[1] += b_r
     logp[2:] += b_p
     p = np.exp(logp[1:] - logp[1:].max())
     value = [dF, dK] + [change[h][0] for h in range(3, 8)]
-    width = [dF_std, np.sqrt(std[2][0, 0]) / theta[X1]]
+    width = [dF_std, np.sqrt(b @ std[2] @ b) / theta[X1]]
     width += [np.sqrt(std[h][0, 0]) for h in range(3, 8)]
     return D, p / p.sum(), np.array(value), np.array(width)
 
@@ -162,6 +174,32 @@ def test_evidence_equals_the_specification(case, eps, b_r, b_p):
     np.testing.assert_allclose(np.exp(s.logp[SET_MID][1:]), p, rtol=1e-5, atol=1e-9)
     np.testing.assert_allclose(s.value[SET_MID][1:], value, rtol=1e-6, atol=1e-9)
     np.testing.assert_allclose(s.sd[SET_MID][1:], std, rtol=1e-6)
+
+
+@pytest.mark.parametrize('growing', [True, False])
+@pytest.mark.parametrize('column', [SIGN, X1])
+def test_evidence_of_growing_changes_equals_the_specification(column, growing):
+    rng = np.random.default_rng(7)
+    phi, w, v = blocks(rng, 40)
+    theta, J0 = reference_posterior(rng)
+    t = np.linspace(0.0, 0.8, 40)  # 10 s
+    phi[:, SIGN_T], phi[:, X1_T] = phi[:, SIGN] * t, phi[:, X1] * t
+    r = 0.02 * phi[:, column] * (t if growing else 1.0)
+    r = r + SIGMA * rng.standard_normal(40) / np.sqrt(w)
+    c = settings_record(SignatureSettings())[0]
+    s = np.zeros(1, STATE_DTYPE)[0]
+    s.theta[:], s.J0[:, :], s.sigma, s.t = theta, J0, SIGMA, 8_000_000_000
+    for k in range(40):
+        s.ph[:], s.w, s.v = phi[k], w[k], v[k]
+        accumulate(s, SET_ALARM, 1.0 - 1.0 / 30.0, r[k])
+    D = evaluate(s, c, SET_ALARM, 0.2, 0.0, 0.0)
+    expected, p, value, std = specification(phi, w, v, r, 1.0 - 1.0 / 30.0, theta, J0, 0.2, 0.0,
+                                            0.0, tau=0.8)
+    assert pytest.approx(expected, rel=1e-6) == D
+    np.testing.assert_allclose(np.exp(s.logp[SET_ALARM][1:]), p, rtol=1e-5, atol=1e-9)
+    np.testing.assert_allclose(s.value[SET_ALARM][1:], value, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(s.sd[SET_ALARM][1:], std, rtol=1e-6)
+    assert p[0 if column == SIGN else 1] > 0.95
 
 
 def test_joint_change_separates_spring_preload_and_friction():
