@@ -170,6 +170,7 @@ class Processes:
             time.sleep(0.01)
         if process.poll() is None:
             process.kill()
+            process.wait()
             raise ProcessError(f'{name} did not end within {patience:g} s:\n{self._tail(name)}')
         self.check()
 
