@@ -3,6 +3,7 @@
 """Compile the hot loops into numba's cache, so that nodes start at once after a build."""
 
 import numpy as np
+from damadics_fd.bag import kernels
 from damadics_fd.core.detector import Detector
 from damadics_fd.core.estimator import Estimator
 from damadics_fd.core.pipeline import run
@@ -16,3 +17,4 @@ Detector(settings).update(estimate)
 names = ('cv', 'x1', 'p1', 'p2', 't1', 'flow', 'ps')
 columns = {name: np.array([value]) for name, value in zip(names, SAMPLE, strict=True)}
 run({'stamp': np.array([1]), **columns}, settings)
+kernels.warm_up()

@@ -25,6 +25,7 @@ setup(
             'estimator = damadics_fd.estimator:main',
             'detector = damadics_fd.detector:main',
             'recorder = damadics_fd.recorder:main',
+            'replay = damadics_fd.replay:main',
         ],
     },
 )

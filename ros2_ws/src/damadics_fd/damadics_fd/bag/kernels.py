@@ -124,3 +124,15 @@ def same_layout(
         for j in range(len(offsets)):
             same = same and word4(data, at + offsets[j]) == values[j]
         out[i] = same
+
+
+def warm_up() -> None:
+    """Compile the loops, or load them from the cache."""
+    data = np.frombuffer(bytes(64), np.uint8)
+    starts, words = np.zeros(1, np.int64), np.zeros(1, np.int64)
+    index(data, np.empty(3, np.uint16), np.empty(3, np.int64), np.empty(3, np.int64), starts)
+    gather2(data, starts, 0, np.empty(1, np.uint16))
+    gather4(data, starts, 0, np.empty(1, np.uint32))
+    gather8(data, starts, words, np.empty((1, 1), np.uint64))
+    gather_stamp(data, starts, 0, np.empty(1, np.int64))
+    same_layout(data, starts, 1, words, np.zeros(1, np.uint32), np.empty(1, bool))

@@ -1,0 +1,275 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Run a recording through estimator and detector, piece by piece, without ROS."""
+
+import math
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from damadics_fd.bag import kernels
+from damadics_fd.bag.columns import Columns
+from damadics_fd.bag.errors import BagError
+from damadics_fd.bag.flags import FlagWriter
+from damadics_fd.bag.recording import Recording, origin
+from damadics_fd.core.detector import Detector
+from damadics_fd.core.estimator import Estimator
+from damadics_fd.core.events import Event
+from damadics_fd.core.pipeline import Result, run
+from damadics_fd.core.quality import REASONS
+from damadics_fd.core.scada.monitor import ScadaMonitor
+from damadics_fd.core.settings import Settings
+from damadics_fd.thinning import Thinner
+
+MODES = ('paper', 'monitor', 'scada')
+NANO = 1e9
+PIECE = 8192  # rows judged at once: they fit the cache, and calls cost nothing against them
+
+
+@dataclass
+class Outcome:
+    """
+    What became of one recording.
+
+    :param bag: its name.
+    :param mode: mode of estimator and detector.
+    :param samples: measurements read.
+    :param duration_s: from the first to the last stamp [s].
+    :param samples_per_s: over reading, decoding, estimator and detector.
+    :param detections: `t` [s] since scenario zero (since the first sample for real data), `stamp`
+        [ns] and the evidence of each.
+    :param refused: samples that never reached the filters, by reason.
+    :param problems: damaged places in the file, which were left out.
+    :param error: why it could not be replayed, '' where it was.
+    """
+
+    bag: str
+    mode: str
+    samples: int = 0
+    duration_s: float = 0.0
+    samples_per_s: float = 0.0
+    detections: list[dict[str, Any]] = field(default_factory=list)
+    refused: dict[str, int] = field(default_factory=dict)
+    problems: list[str] = field(default_factory=list)
+    error: str = ''
+
+
+class Engine(Protocol):
+    """Estimator and detector of one mode."""
+
+    def take(self, columns: Columns, zero: int) -> tuple[list[dict[str, Any]], Result | None]:
+        """Judge the next columns; return the detections, and the rows where the mode has them."""
+
+    @property
+    def refused(self) -> dict[str, int]:
+        """Samples refused so far, by reason."""
+
+
+class Approximator:
+    """
+    The on-line approximator with its detector, as the nodes run them.
+
+    :param settings: all settings.
+    """
+
+    def __init__(self, settings: Settings):
+        self._settings = settings
+        self._estimator, self._detector = Estimator(settings), Detector(settings)
+
+    def take(self, columns: Columns, zero: int) -> tuple[list[dict[str, Any]], Result | None]:
+        """Judge the next columns."""
+        result = run(columns, self._settings, self._estimator, self._detector)
+        return [evidence(event, zero) for event in result.detections], result
+
+    @property
+    def refused(self) -> dict[str, int]:
+        """Samples that the estimator refused, by reason."""
+        counters = self._estimator.counters
+        return {name: counters[name] for name in REASONS[1:] if counters[name]}
+
+
+def evidence(event: Event, zero: int) -> dict[str, Any]:
+    """Return a detection with its evidence, fit for JSON."""
+    values = {
+        't': (event.stamp - zero) / NANO,
+        'stamp': event.stamp,
+        'residual': event.residual,
+        'threshold': event.threshold,
+        'ratio': event.ratio,
+        'level': event.level,
+        'occurrence': event.occurrence,
+        'onset': (event.onset - zero) / NANO if event.onset else None,
+        'cause': event.cause,
+        'confidence': event.confidence,
+        'text': event.text,
+    }
+    return {
+        name: None if isinstance(value, float) and not math.isfinite(value) else value
+        for name, value in values.items()
+    }
+
+
+class Scada:
+    """The monitor for plant data at about 1 Hz."""
+
+    def __init__(self) -> None:
+        self._monitor = ScadaMonitor()
+        self._alarm = False
+        self._samples = 0
+        self._accepted = 0
+
+    def take(self, columns: Columns, zero: int) -> tuple[list[dict[str, Any]], Result | None]:
+        """Judge the next columns."""
+        if not {'p1', 'p2'} <= columns.keys():
+            raise BagError('mode scada needs the pressures p1 and p2')
+        trace = self._monitor.run(columns)
+        self._samples += len(columns['stamp'])
+        self._accepted += len(trace)
+        alarm = trace['alarm']
+        before = np.concatenate(([self._alarm], alarm[:-1]))
+        if len(alarm):
+            self._alarm = bool(alarm[-1])
+        return [
+            {
+                't': float(row['t'] - zero / NANO), 'stamp': round(float(row['t']) * NANO),
+                'residual_x': float(row['r1']), 'residual_flow': float(row['r2']),
+                'ratio': float(row['ratio']),
+            }
+            for row in trace[alarm & ~before]
+        ], None
+
+    @property
+    def refused(self) -> dict[str, int]:
+        """Samples refused or thinned out."""
+        left = self._samples - self._accepted
+        return {'refused_or_thinned': left} if left else {}
+
+
+@dataclass(frozen=True)
+class Plan:
+    """
+    How to replay.
+
+    :param mode: paper, monitor or scada.
+    :param settings: settings that differ from the defaults of the mode.
+    :param figures: folder for pictures, None for none.
+    :param bags: folder for bags with the flags, None for none.
+    """
+
+    mode: str = 'monitor'
+    settings: dict[str, Any] = field(default_factory=dict)
+    figures: Path | None = None
+    bags: Path | None = None
+
+    def engine(self) -> Engine:
+        """Return estimator and detector in their first state."""
+        if self.mode == 'scada':
+            return Scada()
+        return Approximator(Settings.for_mode(self.mode, **self.settings))
+
+
+def replay(
+    recording: Recording, plan: Plan, progress: Callable[[int], None] = lambda count: None,
+    stem: str = '',
+) -> Outcome:
+    """
+    Replay one recording.
+
+    :param recording: what to replay.
+    :param plan: how.
+    :param progress: told the number of samples of each piece.
+    :param stem: file name without suffix for pictures and bags.
+    :return: what became of it; where it cannot be read, `error` says why.
+    """
+    outcome = Outcome(recording.name, plan.mode)
+    try:
+        _replay(recording, plan, outcome, progress, stem or Path(recording.path).stem)
+    except (BagError, OSError, RuntimeError) as error:
+        outcome.error = str(error)
+    return outcome
+
+
+def _replay(
+    recording: Recording, plan: Plan, outcome: Outcome, progress: Callable[[int], None], stem: str
+) -> None:
+    engine = plan.engine()
+    zero = first = last = None
+    flags = FlagWriter(plan.bags / f'{stem}_flags.mcap', recording) if plan.bags else None
+    thinner = Thinner() if plan.figures else None
+    spent = 0.0
+    pieces = joined(recording.chunks(outcome.problems.append))
+    try:
+        while True:
+            began = time.perf_counter()
+            columns = next(pieces, None)
+            if columns is None:
+                break
+            stamp = columns['stamp']
+            if zero is None or first is None:
+                zero, first = origin(int(stamp[0])), int(stamp[0])
+            last = int(stamp[-1])
+            detections, result = engine.take(columns, zero)
+            spent += time.perf_counter() - began
+            outcome.detections += detections
+            outcome.samples += len(stamp)
+            if result is not None and flags:
+                flags.write(result)
+            if result is not None and thinner:
+                thinner.add(columns, result)
+            progress(len(stamp))
+    finally:
+        if flags:
+            flags.close()
+    if first is None or last is None:
+        raise BagError('has no measurement: the topic is empty', recording.name)
+    outcome.duration_s = (last - first) / NANO
+    outcome.samples_per_s = outcome.samples / spent
+    outcome.refused = engine.refused
+    if thinner and plan.figures and plan.mode != 'scada':
+        _draw(thinner, recording, outcome, plan.figures / f'{stem}.png')
+
+
+def joined(pieces: Iterable[Columns]) -> Iterator[Columns]:
+    """Join short pieces to `PIECE` rows or more; without header, the log time is the stamp."""
+    waiting: list[Columns] = []
+    for piece in pieces:
+        if 'stamp' not in piece:
+            piece = {**piece, 'stamp': piece['log_time']}
+        waiting.append(piece)
+        if sum(len(part['stamp']) for part in waiting) >= PIECE:
+            yield _join(waiting)
+            waiting = []
+    if any(len(part['stamp']) for part in waiting):
+        yield _join(waiting)
+
+
+def _join(pieces: list[Columns]) -> Columns:
+    if len(pieces) == 1:
+        return pieces[0]
+    names = [name for name in pieces[0] if all(name in piece for piece in pieces)]
+    return {name: np.concatenate([piece[name] for piece in pieces]) for name in names}
+
+
+def _draw(thinner: Thinner, recording: Recording, outcome: Outcome, path: Path) -> None:
+    from damadics_fd.figures import six_panels
+
+    result, columns = thinner.thinned()
+    truth = recording.truth(outcome.problems.append)
+    if truth is not None and len(truth['stamp']):
+        index = np.searchsorted(truth['stamp'], columns['stamp'], side='right') - 1
+        for name in ('fault', 'strength'):
+            columns[name] = truth[name][np.clip(index, 0, None)]
+    six_panels(result, columns, path, f'{Path(recording.name).name}, mode {outcome.mode}')
+
+
+def warm_up(plans: Sequence[Plan]) -> None:
+    """Load or compile the loops, so that the first recording is not slower than the next."""
+    names = ('cv', 'x1', 'p1', 'p2', 't1', 'flow', 'ps')
+    columns: Columns = {name: np.array([0.5]) for name in names}
+    kernels.warm_up()
+    for plan in plans:
+        plan.engine().take({'stamp': np.array([1]), **columns}, 0)

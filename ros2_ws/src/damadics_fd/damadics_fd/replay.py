@@ -1,0 +1,211 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""The command replay: recordings through estimator and detector."""
+
+import argparse
+import multiprocessing
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, wait
+from pathlib import Path
+from typing import Any
+
+import yaml
+from tqdm import tqdm
+
+from damadics_fd.bag.errors import BagError
+from damadics_fd.bag.recording import Recording, find_recordings, parse_maps
+from damadics_fd.core.settings import Settings, SettingsError
+from damadics_fd.offline import MODES, Outcome, Plan, replay, warm_up
+from damadics_fd.replay_output import FORMATS, print_table, write_outcomes
+
+EXAMPLES = """examples:
+  ros2 run damadics_fd replay bags/friction --mode paper --figures figures --out result.json
+  ros2 run damadics_fd replay plant_bags/ --out alarms.csv
+  ros2 run damadics_fd replay 17112001.txt --actuator 1 --mode scada
+  ros2 run damadics_fd replay valve.mcap --map cv=/pos/setpoint.data*0.01 --map x1=/pos/stem.data
+  ros2 run damadics_fd replay bags/spring --live --rate 2"""
+_counter: Any = None  # samples done by all workers
+
+
+def arguments(args: list[str] | None = None) -> argparse.Namespace:
+    """Parse and check the command line."""
+    parser = argparse.ArgumentParser(
+        prog='replay', epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter,
+        description='Replay recorded bags or tables through estimator and detector.',
+    )
+    parser.add_argument('bags', nargs='+', metavar='BAG', type=Path,
+                        help='MCAP file, bag directory, table (.csv, .txt), or folder of such')
+    parser.add_argument('--mode', choices=MODES, default='monitor')
+    parser.add_argument('--settings', type=Path, metavar='FILE',
+                        help='parameter file of the nodes (YAML)')
+    parser.add_argument('--set', action='append', default=[], metavar='NAME=VALUE',
+                        help='one setting; may be repeated')
+    parser.add_argument('--topic', help='topic of the measurements; by default all of them')
+    parser.add_argument('--map', action='append', default=[], metavar='SIGNAL=SOURCE[*FACTOR]',
+                        help='where a signal is: /topic.field in a bag, a column in a table')
+    parser.add_argument('--actuator', type=int, choices=(1, 2, 3),
+                        help='actuator of a table with the tags of the plant')
+    parser.add_argument('--out', type=Path, metavar='FILE',
+                        help='write the result: .json, .csv or .parquet')
+    parser.add_argument('--figures', type=Path, metavar='DIR', help='draw the six panels')
+    parser.add_argument('--bag', type=Path, nargs='?', const=Path(), metavar='DIR',
+                        help='write the flags as MCAP, next to the input if no DIR is given')
+    parser.add_argument('--jobs', type=int, default=len(os.sched_getaffinity(0)),
+                        help='processes (default: one per core)')
+    parser.add_argument('--live', action='store_true',
+                        help='publish on the topics, with /clock, instead')
+    parser.add_argument('--rate', type=float, default=1.0,
+                        help='speed of --live in multiples of real time (default 1)')
+    parser.add_argument('--inputs-only', action='store_true',
+                        help='with --live: publish no results, for nodes that run')
+    options = parser.parse_args(args)
+    if options.out and options.out.suffix not in FORMATS:
+        parser.error(f'--out {options.out}: the suffix must be one of {", ".join(FORMATS)}')
+    if options.rate <= 0.0:
+        parser.error('--rate must be positive')
+    if options.mode == 'scada' and (options.figures or options.bag or options.live):
+        parser.error('--figures, --bag and --live show the approximator: use mode paper or'
+                     ' monitor')
+    return options
+
+
+def settings_of(options: argparse.Namespace) -> dict[str, Any]:
+    """
+    Return the settings that the user gave.
+
+    :raises SettingsError: where they are wrong, all problems at once.
+    """
+    values: dict[str, Any] = {}
+    if options.settings:
+        values |= _parameters(options.settings)
+    for text in options.set:
+        name, equals, value = text.partition('=')
+        if not equals:
+            raise SettingsError([f'--set {text}: write NAME=VALUE'])
+        values[name] = yaml.safe_load(value)
+    values.pop('mode', None)
+    if options.mode == 'scada':
+        if values:
+            raise SettingsError(['mode scada has no settings'])
+        return {}
+    Settings.for_mode(options.mode, **values)
+    return values
+
+
+def _parameters(path: Path) -> dict[str, Any]:
+    """Read the settings out of a parameter file of the nodes."""
+    try:
+        content = yaml.safe_load(path.read_text(encoding='utf-8'))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise SettingsError([f'{path} cannot be read: {error}']) from error
+    known = {entry['name'] for entry in Settings.describe()}
+    values: dict[str, Any] = {}
+    nodes = content.values() if isinstance(content, dict) else []
+    for node in nodes:
+        parameters = node.get('ros__parameters') if isinstance(node, dict) else None
+        if isinstance(parameters, dict):
+            values |= {name: value for name, value in parameters.items() if name in known}
+    if not values:
+        raise SettingsError([f'{path} holds no ros__parameters of estimator or detector'])
+    return values
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the command."""
+    options = arguments(args)
+    try:
+        settings = settings_of(options)
+        recordings = find_recordings(
+            options.bags, options.topic, parse_maps(options.map), options.actuator
+        )
+        plan = Plan(options.mode, settings, options.figures, options.bag)
+        if options.live:
+            from damadics_fd.live import publish
+
+            return publish(recordings, plan, options.rate, options.inputs_only)
+        outcomes = replay_all(recordings, plan, options.jobs)
+        if options.out:
+            write_outcomes(outcomes, options.out)
+    except (BagError, SettingsError, RuntimeError, OSError) as error:
+        print(f'replay: {error}', file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print('replay: stopped', file=sys.stderr)
+        return 130
+    print_table(outcomes)
+    for outcome in outcomes:
+        for problem in outcome.problems[:3]:
+            print(f'replay: warning: {problem}', file=sys.stderr)
+        if outcome.error:
+            print(f'replay: {outcome.error}', file=sys.stderr)
+    return int(any(outcome.error for outcome in outcomes))
+
+
+def replay_all(recordings: Sequence[Recording], plan: Plan, jobs: int) -> list[Outcome]:
+    """
+    Replay recordings over several processes with a progress bar.
+
+    :param recordings: what to replay.
+    :param plan: how.
+    :param jobs: processes at most.
+    :return: what became of each, in order.
+    """
+    stems = list(unique_stems(recordings))
+    tasks = [
+        (recording, _placed(plan, recording), stem)
+        for recording, stem in zip(recordings, stems, strict=True)
+    ]
+    with tqdm(unit=' samples', unit_scale=True, disable=None, leave=False) as bar:
+        if min(jobs, len(tasks)) <= 1:
+            warm_up([plan])
+            return [replay(recording, where, bar.update, stem) for recording, where, stem in tasks]
+        context = multiprocessing.get_context('spawn')
+        counter = context.Value('q', 0)
+        with ProcessPoolExecutor(
+            min(jobs, len(tasks)), context, initializer=_start, initargs=(counter, plan)
+        ) as pool:
+            waiting = futures = [pool.submit(_work, *task) for task in tasks]
+            while waiting:
+                waiting = list(wait(waiting, timeout=0.2).not_done)
+                bar.update(counter.value - bar.n)
+            return [future.result() for future in futures]
+
+
+def _placed(plan: Plan, recording: Recording) -> Plan:
+    """Put bags next to the input where no folder is given."""
+    if plan.bags != Path():
+        return plan
+    return Plan(plan.mode, plan.settings, plan.figures, recording.path.parent)
+
+
+def unique_stems(recordings: Sequence[Recording]) -> Iterator[str]:
+    """Yield a file name for each recording, no two alike."""
+    seen: dict[str, int] = {}
+    for recording in recordings:
+        stem = recording.path.name.split('.')[0]
+        if recording.table and recording.table.name:
+            stem += f'_{recording.table.name}'
+        elif recording.topic != '/measurement':
+            stem += recording.topic.removesuffix('measurement').rstrip('/').replace('/', '_')
+        seen[stem] = seen.get(stem, 0) + 1
+        yield stem if seen[stem] == 1 else f'{stem}_{seen[stem]}'
+
+
+def _start(counter: Any, plan: Plan) -> None:
+    global _counter
+    _counter = counter
+    warm_up([plan])
+
+
+def _work(recording: Recording, plan: Plan, stem: str) -> Outcome:
+    def progress(count: int) -> None:
+        with _counter.get_lock():
+            _counter.value += count
+
+    return replay(recording, plan, progress, stem)
+
+
+if __name__ == '__main__':
+    sys.exit(main())
