@@ -108,10 +108,8 @@ def simulate_block(state: Any, constants: Any, faults: Any, f: Any, effects: Any
     decay = math.exp(-q)
     hold = int(round(a.hold * rate))
     x_low, x_high = -0.05 * a.stroke, 1.25 * a.stroke
-    update_effects(faults, s.k / rate, f, a, e, False)
     for i in range(inputs.shape[1]):
-        if len(faults) > 0:
-            update_effects(faults, s.k / rate, f, a, e, False)
+        update_effects(faults, s.k / rate, f, a, e, False)
         width = e.play
         if e.twist > 0.0:
             width *= 1.0 + e.twist * (1.0 - s.X_ / a.stroke)

@@ -42,23 +42,32 @@ class Disturbance:
             for name, child in zip(SIGNALS, children, strict=True)
         }
 
-    def disturb(self, name: str, values: np.ndarray, first: int, every: int,
-                rate: float) -> np.ndarray:
+    @staticmethod
+    def hum(first: int, n: int, rate: float) -> np.ndarray:
+        """
+        Evaluate the 50 Hz hum.
+
+        :param first: first tick.
+        :param n: number of ticks.
+        :param rate: ticks per second.
+        :return: share of the range, shape (n,).
+        """
+        return HUM * np.sin(2 * np.pi * np.mod(50.0 * np.arange(first, first + n) / rate, 1.0))
+
+    def disturb(self, name: str, values: np.ndarray, every: int, hum: np.ndarray) -> np.ndarray:
         """
         Disturb a block of a signal.
 
         :param name: one of `SIGNALS`.
-        :param values: samples at ticks first, first + every, ... in SI; shape (n,).
-        :param first: tick of the first sample.
-        :param every: ticks per sample; noise is drawn for each tick.
-        :param rate: ticks per second.
+        :param values: samples in SI, shape (n,).
+        :param every: ticks per sample; noise is drawn for each tick, so that a slower recorder
+            sees every n-th of the same samples.
+        :param hum: at the samples, shape (n,).
         :return: disturbed samples within the range of the transmitter, shape (n,).
         """
-        n = len(values)
-        white = self._streams[name].standard_normal(n * every)[::every]
+        white = self._streams[name].standard_normal(len(values) * every)[::every]
         if name == 'ps':
             return values + CHAMBER_NOISE * white
-        hum = np.sin(2 * np.pi * np.mod(50.0 * (first + every * np.arange(n)) / rate, 1.0))
         span = RANGES[name]
-        disturbed: np.ndarray = np.clip(values + span * (HUM * hum + WHITE * white), 0.0, span)
+        disturbed: np.ndarray = np.clip(values + span * (hum + WHITE * white), 0.0, span)
         return disturbed

@@ -161,6 +161,7 @@ class Fault:
 
 FAULT_DTYPE = np.dtype((np.record, [
     ('number', 'i8'), ('strength', 'f8'), ('start', 'f8'), ('end', 'f8'), ('development', 'f8'),
+    ('now', 'f8'),  # signed strength that the effects are made from
 ]))
 
 
@@ -174,7 +175,7 @@ def fault_table(faults: Sequence[Fault]) -> 'np.ndarray[Any, np.dtype[Any]]':
     rows = np.zeros(len(faults), FAULT_DTYPE)
     for i, fault in enumerate(faults):
         rows[i] = (fault.number, fault.strength * fault.direction,
-                   fault.start, fault.end, fault.development)
+                   fault.start, fault.end, fault.development, math.nan)
     return rows
 
 
@@ -209,18 +210,26 @@ def update_effects(faults: Any, t: float, f: Any, a: Record, e: Record, lugre: b
     """
     Evaluate all faults at a time and translate them into what the model uses (table 2.1).
 
-    :param faults: rows of `fault_table`.
+    :param faults: rows of `fault_table`; `now` is updated.
     :param t: time [s].
     :param f: work space of shape (20,), receives the strengths f[1]..f[19].
     :param a: constants of the actuator.
-    :param e: effects, overwritten.
+    :param e: effects, overwritten where a strength has changed or they are all 0.
     :param lugre: whether friction and spring act as in the paper's equations (8), (9).
     """
+    changed = e.area == 0.0 and e.flow_factor == 0.0
+    for i in range(len(faults)):
+        s = strength_at(faults[i], t)
+        if s != faults[i].now:
+            faults[i].now = s
+            changed = True
+    if not changed:
+        return
     f[:] = 0.0
     e.number = 0.0
     e.strength = 0.0
     for i in range(len(faults)):
-        s = strength_at(faults[i], t)
+        s = faults[i].now
         if s != 0.0:
             f[faults[i].number] += s
             if e.number == 0.0:

@@ -33,6 +33,9 @@ RATE = 200.0
 SUBSTEP = 1e-3
 """Longest substep [s]."""
 
+JERK = 0.01
+"""Change of velocity in a substep beyond which the substep is done again in four [m/s]."""
+
 STATE_DTYPE = np.dtype((np.record, [
     ('y1', 'f8'), ('y2', 'f8'),  # set-point filter [1]
     ('ma', 'f8'),  # air in the chamber [kg]
@@ -75,9 +78,10 @@ def _half_step(v: float, z: float, h: float, mass: float, force: float, stiffnes
     s0, s1 = a.bristle_stiffness, a.bristle_damping
     fc, df = a.coulomb, a.static - a.coulomb
     low, high = -200.0, 200.0
-    w = v
+    w, zn, dzn, move = v, z, 0.0, 0.0
     for _ in range(100):
-        stribeck = df * math.exp(-(w / a.stribeck) * (w / a.stribeck))
+        ratio = (w / a.stribeck) * (w / a.stribeck)
+        stribeck = df * math.exp(-ratio) if ratio < 50.0 else 0.0
         g = fc + stribeck
         lam = s0 * abs(w) / g
         dg = -2.0 * w / (a.stribeck * a.stribeck) * stribeck
@@ -96,12 +100,11 @@ def _half_step(v: float, z: float, h: float, mass: float, force: float, stiffnes
         new = w - step
         if not low < new < high or dr <= 0.0:
             new = 0.5 * (low + high)
-        if abs(new - w) <= 1e-10 + 1e-9 * abs(w):
-            w = new
-            break
+        move = new - w
         w = new
-    lam = s0 * abs(w) / (fc + df * math.exp(-(w / a.stribeck) * (w / a.stribeck)))
-    return w, (z + h * w) / (1.0 + h * lam)
+        if abs(move) <= 1e-9 + 1e-7 * abs(w):  # quadratic convergence: the error is its square
+            break
+    return w, zn + dzn * move
 
 
 @jit
@@ -152,10 +155,8 @@ def simulate_block(state: Any, constants: Any, faults: Any, f: Any, effects: Any
     h = 1.0 / (rate * substeps)
     q = h / a.lag
     decay = math.exp(-q)
-    update_effects(faults, s.k / rate, f, a, e, True)
     for i in range(inputs.shape[1]):
-        if len(faults) > 0:
-            update_effects(faults, s.k / rate, f, a, e, True)
+        update_effects(faults, s.k / rate, f, a, e, True)
         p1, p2 = inputs[1, i] * e.p1, inputs[2, i] * e.p2
         t1 = min(300.0, inputs[3, i] + e.heat) if e.heat > 0.0 else inputs[3, i]
         if t1 != s.t1:
@@ -168,13 +169,19 @@ def simulate_block(state: Any, constants: Any, faults: Any, f: Any, effects: Any
             measure(x + e.xr_offset, x, ps, p1, p2, t1, s.pv, a, e, out[:, i // every])
         dp = max(p1, s.pv) - p2
         for _ in range(substeps):
+            update_effects(faults, (s.substep + 0.5) * h, f, a, e, True)
             fed_back = min(max(s.x * e.position, -0.25 * a.stroke), 1.25 * a.stroke)
             fed_back = min(max(fed_back, -0.01), 0.05)
             s.xb = min(max(s.xb, fed_back - 0.5 * e.feedback), fed_back + 0.5 * e.feedback)
             if s.substep * h >= s.held * a.hold - 1e-9:
                 s.e = transducer(s.y2, s.xb / a.stroke, a.gain)
                 s.held += 1
+            ma, v, x, z = s.ma, s.v, s.x, s.z
             _substep(s, a, e, dp, h)
+            if abs(s.v - v) > JERK:
+                s.ma, s.v, s.x, s.z = ma, v, x, z
+                for _ in range(4):
+                    _substep(s, a, e, dp, 0.25 * h)
             s.y1, s.y2 = set_point_filter(s.y1, s.y2, inputs[0, i], q, decay)
             s.substep += 1
         s.k += 1

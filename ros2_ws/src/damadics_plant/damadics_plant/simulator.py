@@ -136,10 +136,9 @@ class Simulator:
         self._advance: Callable[..., None] = module.simulate_block
         self._constants = self.actuator.record()
         self._state: Any = module.initial_state(self.actuator)
-        self._effects = np.zeros(1, EFFECTS_DTYPE)
         self._strengths = np.zeros(20)
         self._faults = [_admissible(fault, self.actuator) for fault in self.scenario.faults]
-        self._table = fault_table(self._faults)
+        self._lay_out_faults()
         names = ('cv', 'p1', 'p2', 't1')
         self._sources: list[Source] = [
             source.seeded(seed) if isinstance(source, RandomSteps) else source
@@ -218,12 +217,16 @@ class Simulator:
         """
         new = Fault(fault, strength, start=self.time, development=development)
         self._faults.append(_admissible(new, self.actuator))
-        self._table = fault_table(self._faults)
+        self._lay_out_faults()
 
     def clear(self) -> None:
         """Remove all faults, those to come included, from the next sample on."""
         self._faults.clear()
+        self._lay_out_faults()
+
+    def _lay_out_faults(self) -> None:
         self._table = fault_table(self._faults)
+        self._effects = np.zeros(1, EFFECTS_DTYPE)
 
     def _fill(self, out: np.ndarray) -> None:
         n = out.shape[1]
@@ -238,12 +241,15 @@ class Simulator:
         np.clip(inputs[0], 0.0, 1.024, out=inputs[0])
         noise = self._disturbance
         if noise:
-            inputs[0] = noise.disturb('cv', inputs[0], first, 1, self._tick_rate)
+            hum = noise.hum(first, len(t), self._tick_rate)
+            inputs[0] = noise.disturb('cv', inputs[0], 1, hum)
+        outputs = np.empty((len(OUTPUTS), n))  # contiguous, so that there is one compiled version
         self._advance(self._state, self._constants, self._table, self._strengths, self._effects,
-                      inputs, self._tick_rate, self._every, out[1:])
+                      inputs, self._tick_rate, self._every, outputs)
+        out[1:] = outputs
         if noise and self._noisy_outputs:
             for row, name in zip(out[1:], OUTPUTS[:6], strict=False):
-                row[:] = noise.disturb(name, row, first, self._every, self._tick_rate)
+                row[:] = noise.disturb(name, row, self._every, hum[::self._every])
         self._done += n
 
 
