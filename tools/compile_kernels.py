@@ -8,6 +8,7 @@ from damadics_fd.core.detector import Detector
 from damadics_fd.core.estimator import Estimator
 from damadics_fd.core.pipeline import run
 from damadics_fd.core.settings import Settings
+from damadics_plant import simulate
 
 SAMPLE = (0.5, 0.5, 3.5e6, 2.6e6, 20.0, 5.0, 1e5)
 
@@ -18,3 +19,5 @@ names = ('cv', 'x1', 'p1', 'p2', 't1', 'flow', 'ps')
 columns = {name: np.array([value]) for name, value in zip(names, SAMPLE, strict=True)}
 run({'stamp': np.array([1]), **columns}, settings)
 kernels.warm_up()
+for model in ('dablib', 'lugre'):
+    simulate('nominal', model=model, duration=0.0)
