@@ -26,6 +26,8 @@ setup(
             'detector = damadics_fd.detector:main',
             'recorder = damadics_fd.recorder:main',
             'replay = damadics_fd.replay:main',
+            'verify = damadics_fd.verify:main',
+            'recover = damadics_fd.recover:main',
         ],
     },
 )

@@ -68,13 +68,17 @@ class McapWriter:
     :param profile: profile of the file, `ros2` for bags.
     :param chunk_size: uncompressed size from which a chunk is closed [B].
     :param level: zstd compression level.
+    :param message_index: write an index of the messages behind each chunk; readers that want one
+        topic or one instant of a large file gain from it.
     """
 
     def __init__(
-        self, stream: Sink, profile: str = 'ros2', chunk_size: int = CHUNK_SIZE, level: int = 1
+        self, stream: Sink, profile: str = 'ros2', chunk_size: int = CHUNK_SIZE, level: int = 1,
+        message_index: bool = True,
     ):
         self._stream = stream
         self._chunk_size = chunk_size
+        self._message_index = message_index
         self._compress = zstandard.ZstdCompressor(level=level).compress
         self._schemas: list[Schema] = []
         self._channels: list[Channel] = []
@@ -82,12 +86,14 @@ class McapWriter:
         self._chunk_index: list[bytes] = []
         self._metadata_index: list[bytes] = []
         self._times: tuple[int, int] | None = None
+        self._crc = 0  # of the data section
         self._reset_chunk()
         self.position = 0  # [B] written to the stream so far
         self._write(MAGIC + record(Op.HEADER, string(profile), string(LIBRARY)))
 
     def _write(self, data: bytes) -> None:
         self._stream.write(data)
+        self._crc = zlib.crc32(data, self._crc)
         self.position += len(data)
 
     def _reset_chunk(self) -> None:
@@ -110,19 +116,27 @@ class McapWriter:
     def add_schema(self, name: str, encoding: str, data: bytes) -> int:
         """Write a schema and return its number."""
         schema = Schema(len(self._schemas) + 1, name, encoding, data)
-        self._schemas.append(schema)
-        self._write(schema_record(schema))
+        self.put_schema(schema)
         return schema.id
+
+    def put_schema(self, schema: Schema) -> None:
+        """Write a schema that has its number."""
+        self._write(schema_record(schema))
+        self._schemas.append(schema)
 
     def add_channel(
         self, schema_id: int, topic: str, message_encoding: str, metadata: dict[str, str]
     ) -> int:
         """Write a channel and return its number."""
         channel = Channel(len(self._channels) + 1, schema_id, topic, message_encoding, metadata)
+        self.put_channel(channel)
+        return channel.id
+
+    def put_channel(self, channel: Channel) -> None:
+        """Write a channel that has its number."""
+        self._write(channel_record(channel))
         self._channels.append(channel)
         self._counts[channel.id] = 0
-        self._write(channel_record(channel))
-        return channel.id
 
     def add_message(
         self, channel_id: int, data: bytes, log_time: int, publish_time: int, sequence: int = 0
@@ -185,6 +199,28 @@ class McapWriter:
             self._log_times = [int(stamps[0]), int(stamps[-1])]
             self.end_chunk()
 
+    def add_records(
+        self, data: bytes, channels: NDArray, log_times: NDArray, offsets: NDArray
+    ) -> None:
+        """
+        Write Message records that are encoded already as one chunk.
+
+        :param data: the records one after the other.
+        :param channels: channel of each.
+        :param log_times: log time of each [ns].
+        :param offsets: place of each in `data` [B].
+        """
+        self.end_chunk()
+        for channel in np.unique(channels).tolist():
+            rows = channels == channel
+            entries = [log_times[rows].astype('<u8'), offsets[rows].astype('<u8')]
+            pairs = np.stack(entries, axis=1)
+            self._index[channel] = [pairs.tobytes()]
+            self._counts[channel] += len(pairs)
+        self._parts, self._size = [data], len(data)
+        self._log_times = [int(log_times.min()), int(log_times.max())]
+        self.end_chunk()
+
     def end_chunk(self) -> None:
         """Compress and write the open chunk with its message index."""
         if not self._size:
@@ -207,7 +243,7 @@ class McapWriter:
         offsets = []
         indexes = []
         index_at = at + len(chunk)
-        for channel_id, entries in self._index.items():
+        for channel_id, entries in self._index.items() if self._message_index else ():
             offsets.append(struct.pack('<HQ', channel_id, index_at))
             indexes.append(record(
                 Op.MESSAGE_INDEX, struct.pack('<H', channel_id), string(b''.join(entries))
@@ -241,7 +277,7 @@ class McapWriter:
     def finish(self) -> None:
         """Write the summary and the footer; the stream stays open."""
         self.end_chunk()
-        self._write(record(Op.DATA_END, struct.pack('<I', 0)))
+        self._write(record(Op.DATA_END, struct.pack('<I', self._crc)))
         start, end = self._times or (0, 0)
         counts = b''.join(struct.pack('<HQ', *entry) for entry in self._counts.items())
         statistics = STATISTICS.pack(

@@ -6,7 +6,7 @@ import os
 import re
 import zlib
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO, NamedTuple, Self
 
@@ -17,8 +17,6 @@ from damadics_fd.bag import kernels
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.limits import Limits
 from damadics_fd.bag.records import (
-    FOOTER,
-    FOOTER_SIZE,
     HEAD,
     MAGIC,
     Channel,
@@ -31,11 +29,12 @@ from damadics_fd.bag.records import (
     parse_schema,
     record,
 )
+from damadics_fd.bag.summary import read_summary
 from damadics_fd.bag.unpack import decompress, open_plain
 from damadics_fd.bag.wellformed import well_formed
 
 LOOSE = 1 << 20  # [B] handled at a time where there are no chunks
-_HEAD_PATTERN = re.compile(rb'[\x01-\x0f].{4}\x00{4}', re.DOTALL)
+_HEAD_PATTERN = re.compile(rb'[\x01-\x0f](?=.{4}\x00{4})', re.DOTALL)
 
 
 class _GivenUp(Exception):  # noqa: N818
@@ -75,7 +74,7 @@ class Batch:
     sizes: NDArray[np.int64]
     offset: int
 
-    def log_times(self, rows: NDArray[np.intp] | slice = slice(None)) -> NDArray[np.int64]:
+    def log_times(self, rows: NDArray | slice = slice(None)) -> NDArray[np.int64]:
         """Return the log times of some messages [ns]."""
         out = np.empty((1, len(self.starts[rows])), np.uint64)
         offsets = np.array([-16], np.int64)
@@ -86,16 +85,6 @@ class Batch:
         """Return one serialised message."""
         start = self.starts[row]
         return self.data[start:start + self.sizes[row]].tobytes()
-
-
-@dataclass
-class Summary:
-    """What the end of a finished file says about it."""
-
-    schemas: dict[int, Schema] = field(default_factory=dict)
-    channels: dict[int, Channel] = field(default_factory=dict)
-    counts: dict[int, int] = field(default_factory=dict)  # messages by channel
-    chunks: list[int] = field(default_factory=list)  # offsets
 
 
 class McapFile:
@@ -116,12 +105,13 @@ class McapFile:
         self.channels: dict[int, Channel] = {}
         self.metadata: list[tuple[str, dict[str, str]]] = []
         self.profile = ''
-        self.ended = False  # the walk has seen the end of the data section
+        self.end = 0  # [B] where the walk has seen the end of the data section
+        self.crc = 0  # of the data section, 0 where the file has none
         self._tolerant = tolerant
         self._text = 0
         self._stream: BinaryIO = open_plain(self.path, limits)
         self._size = os.fstat(self._stream.fileno()).st_size
-        self.summary = self._read_summary()
+        self.summary = read_summary(self._read, self._size, limits)
         self.schemas.update(self.summary.schemas)
         self.channels.update(self.summary.channels)
 
@@ -136,6 +126,10 @@ class McapFile:
     def _read(self, at: int, size: int) -> bytes:
         return os.pread(self._stream.fileno(), size, at)
 
+    def read_bytes(self, at: int, size: int) -> bytes:
+        """Return raw bytes of the file, fewer at its end."""
+        return self._read(at, size)
+
     def problem(self, offset: int, text: str) -> None:
         """Note damage, or raise it where it is not tolerated."""
         if not self._tolerant:
@@ -143,48 +137,6 @@ class McapFile:
         self.problems.append(Problem(offset, text))
         if len(self.problems) > self.limits.problems:
             raise _GivenUp
-
-    def _read_summary(self) -> Summary:
-        """Read the summary; an empty one where it is absent or damaged."""
-        summary = Summary()
-        tail = self._read(max(0, self._size - FOOTER_SIZE - len(MAGIC)), FOOTER_SIZE + len(MAGIC))
-        if len(tail) < FOOTER_SIZE + len(MAGIC) or not tail.endswith(MAGIC):
-            return summary
-        op, length = HEAD.unpack_from(tail)
-        start, _, crc = FOOTER.unpack_from(tail, HEAD.size)
-        end = self._size - len(MAGIC) - FOOTER_SIZE
-        if op != Op.FOOTER or length != FOOTER.size or not 0 < start <= end:
-            return summary
-        if end - start > self.limits.record:
-            return summary
-        data = self._read(start, end - start + FOOTER_SIZE - 4)
-        if crc and zlib.crc32(data) != crc:
-            return summary
-        try:
-            self._parse_summary(memoryview(data)[:end - start], summary)
-        except BagError:
-            return Summary()  # reported when the walk comes there
-        return summary
-
-    def _parse_summary(self, data: memoryview, summary: Summary) -> None:
-        at = 0
-        while at < len(data):
-            fields = Fields(data[at:])
-            op, length = fields.unpack(HEAD)
-            content = fields.take(length)
-            at += HEAD.size + length
-            if op == Op.SCHEMA:
-                schema = parse_schema(content)
-                summary.schemas[schema.id] = schema
-            elif op == Op.CHANNEL:
-                channel = parse_channel(content)
-                summary.channels[channel.id] = channel
-            elif op == Op.CHUNK_INDEX:
-                summary.chunks.append(int.from_bytes(content[16:24], 'little'))
-            elif op == Op.STATISTICS:
-                counts = Fields(content[46:])
-                pairs = np.frombuffer(counts.take(counts.left // 10 * 10), '<u2,<u8')
-                summary.counts = {int(number): int(count) for number, count in pairs}
 
     def batches(self) -> Iterator[Batch]:
         """
@@ -218,21 +170,25 @@ class McapFile:
             at = len(MAGIC)
         else:
             self.problem(0, 'does not start as an MCAP file')
+        doubtful = None  # the record before, where nothing vouches for its length
         while at < self._size:
             try:
                 found = self._record(at)
             except BagError as error:
                 self.problem(at, error.reason)
-                following = self._search(at + 1)
+                following = self._search((at if doubtful is None else doubtful) + 1)
                 if following is None:
                     return
-                at = following
+                at, doubtful = following, None
                 continue
             if found.op in (Op.DATA_END, Op.FOOTER):
-                self.ended = True
+                self.end, self.crc = at, int.from_bytes(found.content[:4], 'little')
                 return
+            if found.op < 0x80 or doubtful is None:
+                doubtful = at
             if found.op in (Op.CHUNK, Op.MESSAGE):
                 yield at, found
+                doubtful = None
             at += HEAD.size + found.length
         self.problem(at, 'ends without a footer: the recording was not closed')
 

@@ -6,6 +6,7 @@ import io
 import os
 import time
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -80,6 +81,8 @@ class BagWriter:
     :param quota_bytes: remove the oldest files of this bag beyond so many bytes, 0 for never.
     :param chunk_size: uncompressed size of a chunk [B].
     :param flush_period: greatest age of a message that is not yet in the file [s].
+    :param level: zstd compression level.
+    :param message_index: write the index behind each chunk.
     :param custom_data: entries for the `custom_data` of the bag.
     :raises BagError: where the directory already holds something or cannot be created.
     """
@@ -87,6 +90,7 @@ class BagWriter:
     def __init__(
         self, path: str | Path, *, split_bytes: int = 0, split_seconds: float = 0.0,
         quota_bytes: int = 0, chunk_size: int = CHUNK_SIZE, flush_period: float = FLUSH_PERIOD,
+        level: int = 1, message_index: bool = True,
         custom_data: Mapping[str, str] | None = None,
     ):
         self.path = Path(path)
@@ -96,7 +100,10 @@ class BagWriter:
         self._quota_bytes = quota_bytes
         self._split_bytes = split_bytes or quota_bytes // 8
         self._split_time = int(split_seconds * NANO)
-        self._chunk_size, self._flush_period = chunk_size, flush_period
+        self._flush_period = flush_period
+        self._make_mcap = partial(
+            McapWriter, chunk_size=chunk_size, level=level, message_index=message_index
+        )
         self._custom_data = dict(custom_data or {})
         self._topics: dict[str, Topic] = {}
         self._channels: dict[str, int] = {}  # of the present file
@@ -125,7 +132,7 @@ class BagWriter:
         self._number += 1
         self._channels.clear()
         self._schemas.clear()
-        self._mcap = McapWriter(self._stream, chunk_size=self._chunk_size)
+        self._mcap = self._make_mcap(self._stream)
         self._file = BagFile(name)
         self._files.append(self._file)
 
