@@ -12,7 +12,7 @@ import numpy as np
 from damadics_fd.core.jit import jit
 from damadics_fd.core.signature_air import supply_lost, track_air
 from damadics_fd.core.signature_blocks import add_sample, close_block, judge_block, open_block
-from damadics_fd.core.signature_cues import check_passivity, track_stick
+from damadics_fd.core.signature_cues import check_passivity, stick_evidence, track_stick
 from damadics_fd.core.signature_decision import (
     D_VERIFY,
     FULL_EVIDENCE,
@@ -214,7 +214,9 @@ def judge(s: Any, c: Any) -> int:
     """
     before = s.state * 10000 + s.family * 100 + s.cause
     judge_block(s, c)
-    track_stick(s)
+    fresh = s.state != STATE_ALARM or since_alarm(s, c)
+    if fresh:
+        track_stick(s)
     air = track_air(s, c, s.alarm_in == 0 and s.own == 0)
     if s.state == STATE_LEARN or s.state == STATE_INSUFFICIENT:
         if s.alarm_in == 0 and (s.t - s.t0) * 1e-9 >= c.start:
@@ -228,13 +230,28 @@ def judge(s: Any, c: Any) -> int:
     else:
         if s.state == STATE_ALARM:
             check_passivity(s, c)
-        if s.moving != 0:
+        if s.moving != 0 and fresh:
             monitor_block(s, c)
+        elif s.state == STATE_ALARM and s.standing != 0 and stick_evidence(s) > 0.0:
+            decide(s, c)
         if s.state == STATE_VERIFY:
             finish_verification(s, c)
         elif air and s.state == STATE_MONITOR and supply_lost(s, c):
             start_supply_alarm(s, c)
     return CHANGED if s.state * 10000 + s.family * 100 + s.cause != before else BLOCK
+
+
+@jit
+def since_alarm(s: Any, c: Any) -> bool:
+    """
+    Tell whether the middle block began after the alarm.
+
+    :param s: state record.
+    :param c: settings record.
+    :return: False for a block that mixes before and after.
+    """
+    began: bool = s.bt[1] - 0.5 * c.block >= (s.alarm_t - s.t0) * 1e-9
+    return began
 
 
 @jit
@@ -254,6 +271,7 @@ def monitor_block(s: Any, c: Any) -> None:
         s.ph[SIGN_T] = s.ph[SIGN] * tau
         s.ph[X1_T] = s.ph[X1] * tau
         accumulate(s, SET_ALARM, 1.0 - 1.0 / c.memory[SET_ALARM], r)
+        s.n_alarm += s.w
         decide(s, c)
         return
     watch(s, c)

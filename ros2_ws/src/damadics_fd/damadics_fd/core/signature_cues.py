@@ -8,6 +8,7 @@ from damadics_fd.core.jit import jit
 from damadics_fd.core.signature_blocks import table_force
 from damadics_fd.core.signature_types import ONE, SIGN, X1
 
+B_MAX = 16.0  # enough to decide alone, unless the moving stem contradicts
 EPISODE = 0.004  # [1] a standing stem may creep this far
 PASSIVITY_WINDOW = 1_000_000_000  # [ns] after the alarm
 PASSIVITY_HOLD = 10_000_000_000  # [ns]
@@ -42,9 +43,9 @@ def stick_evidence(s: Any) -> float:
     Return the log evidence of the stick range for friction.
 
     :param s: state record.
-    :return: b_R, 0..12.
+    :return: b_R, 0..16.
     """
-    b_r: float = max(0.0, min(12.0, 6.0 * (s.r_max / s.r_ref - 1.8)))
+    b_r: float = max(0.0, min(B_MAX, 6.0 * (s.r_max / s.r_ref - 1.8)))
     return b_r
 
 

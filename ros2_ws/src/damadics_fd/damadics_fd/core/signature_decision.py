@@ -42,7 +42,8 @@ from damadics_fd.core.signature_types import (
 SECOND = 1_000_000_000  # [ns]
 FULL_EVIDENCE = 18.0  # blocks since the alarm, from which the fast set holds nothing older
 NULL_MOVING = 12.0  # blocks since the alarm
-NULL_STICK = 1.5  # stick range / reference
+NULL_STICK = 1.5  # stick range / reference; a healthy valve reaches 1.44
+NULL_D = 15.0  # less evidence of the moving stem than this is none
 FLIP = 10  # evaluated blocks in a row that overturn a firm family
 P_STICK = 0.96
 P_SUPPLY = 0.95
@@ -183,12 +184,11 @@ def own_alarm_allowed(s: Any, c: Any) -> bool:
 @jit
 def decide(s: Any, c: Any) -> None:
     """
-    Judge the alarm after a moving block.
+    Judge the alarm after a moving block, or a standing one that widened the stick range.
 
     :param s: state record; family, cause, value, std and confidence are written.
     :param c: settings record.
     """
-    s.n_alarm += s.w
     b_r = stick_evidence(s)
     b_p = 6.0 if s.t < s.b_p_until and s.ne[SET_ALARM] < STAGE2_EVIDENCE else 0.0
     m = SET_ALARM
@@ -205,18 +205,20 @@ def decide(s: Any, c: Any) -> None:
         elif s.run_e >= (FLIP if s.family == FAMILY_FRICTION else c.n_firm):
             s.family = FAMILY_ELASTIC
         if s.family == FAMILY_FRICTION and p_f > 0.5:
-            name_friction(s, m, p_f)
+            if D - 2.0 * b_r < NULL_D:
+                name_stick(s, p_f)
+            else:
+                name_friction(s, m, p_f)
         elif s.family == FAMILY_ELASTIC and p_f < 0.5:
             name_elastic(s, c, m, 1.0 - p_f)
-    elif s.n_alarm >= NULL_MOVING and s.r_max > NULL_STICK * s.r_ref:
+    elif (
+        s.n_alarm >= NULL_MOVING and D - 2.0 * b_r < NULL_D and s.r_max > NULL_STICK * s.r_ref
+    ):
         s.run_e = 0
         s.run_f += 1
         if s.run_f >= c.n_firm:
             s.family = FAMILY_FRICTION
-            s.cause = CAUSE_STICK_PLAY
-            s.confidence = P_STICK
-            s.cause_value = s.r_max / s.r_ref - 1.0
-            s.cause_std = 0.0
+            name_stick(s, P_STICK)
     else:
         s.run_f = 0
         s.run_e = 0
@@ -236,6 +238,20 @@ def doubt(s: Any, c: Any) -> None:
     if waited and s.n_alarm >= NULL_MOVING and s.family == FAMILY_UNDETERMINED:
         s.family = FAMILY_UNCONFIRMED
         s.cause = CAUSE_UNCONFIRMED
+
+
+@jit
+def name_stick(s: Any, p: float) -> None:
+    """
+    Report friction or play that only the standing stem shows.
+
+    :param s: state record.
+    :param p: probability.
+    """
+    s.cause = CAUSE_STICK_PLAY
+    s.confidence = p
+    s.cause_value = s.r_max / s.r_ref - 1.0
+    s.cause_std = 0.0
 
 
 @jit

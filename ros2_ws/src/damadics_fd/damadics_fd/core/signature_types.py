@@ -110,7 +110,7 @@ class SignatureSettings:
     memory: tuple[float, float, float, float] = (6.0, 30.0, 300.0, 30.0)
     change_std: tuple[float, ...] = (0.5, 0.2, 1.0, 0.2, 0.3, 0.3, 0.3, 0.1)  # v s | h = 2..7
     growth_std: tuple[float, float] = (0.3, 1.0)  # friction, spring: change in 10 s
-    prior: tuple[float, ...] = (1.0, 0.45, 0.45, 0.02, 0.02, 0.02, 0.02, 0.02)
+    prior: tuple[float, ...] = (1.0, 0.45, 0.45, 0.03, 0.03, 0.03, 0.03, 0.03)
     model_error: float = 0.2  # eps
     model_error_stage2: float = 0.03
     # decision (2.6 - 2.9)
