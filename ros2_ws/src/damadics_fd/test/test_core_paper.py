@@ -61,7 +61,7 @@ def test_chunks_agree_with_the_whole():
     second = run({name: c[1500:] for name, c in columns.items()}, settings, first.estimator,
                  first.detector)
     joined = np.concatenate([first.decisions, second.decisions])
-    assert joined.tobytes() == whole.decisions.tobytes()
+    assert joined.tolist() == whole.decisions.tolist()
 
 
 def test_core_imports_no_ros_package():

@@ -112,7 +112,7 @@ class Estimator:
             return 'waiting for the first good sample'
         if s.phase == PHASE_HOLD:
             return 'on hold: the input was interrupted, the filters settle'
-        still = (s.elapsed - s.moved) * 1e-9
+        still = (s.elapsed - s.rested) * 1e-9
         if s.phase in (PHASE_PAPER, PHASE_MONITOR):
             if still > STILL:
                 return (f'monitoring limited, no excitation: the stem has not moved for '

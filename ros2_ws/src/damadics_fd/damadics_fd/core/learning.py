@@ -4,7 +4,7 @@
 
 from typing import Any
 
-from damadics_fd.core import approximator, settled
+from damadics_fd.core import approximator, honn, settled
 from damadics_fd.core.jit import jit
 from damadics_fd.core.modes import (
     PAPER,
@@ -19,7 +19,12 @@ from damadics_fd.core.modes import (
 STATE = [('elapsed', 'i8'),  # ns since the first sample, gaps that restart the filters left out
          ('start', 'i8'),  # elapsed time at which learning began
          ('held_until', 'i8'),  # elapsed time at which the filters have settled after a restart
-         ('armed', '?'), ('phase', 'i8'), *settled.STATE]
+         ('armed', '?'), ('phase', 'i8'), ('trend', 'f8'), ('noise', 'f8'),
+         ('rest', 'f8'), ('rested', 'i8'), *settled.STATE]
+
+TREND = 0.1  # s; slower parts of the disturbance are no noise
+MEDIAN = 2.0  # s in which the median of the noise may grow e times
+LEAST_NOISE = 1e-3  # 1/s2
 
 
 @jit
@@ -33,6 +38,7 @@ def forget(s: Any, c: Any) -> None:
     approximator.begin(s, c)
     s.armed = False
     s.travel = 0.0
+    s.noise = LEAST_NOISE
     s.compared = 0
     s.block[:] = 0.0
     s.block_end = 0
@@ -86,7 +92,8 @@ def phase_of(s: Any, c: Any) -> int:
         return PHASE_LEARN_ALPHA
     if t < c.t_learn or s.travel < c.travel_min or (guarded(c) and s.compared == 0):
         return PHASE_LEARN_PHI
-    s.armed = True
+    cover_noise(s, c)
+    arm(s)
     return PHASE_MONITOR
 
 
@@ -142,6 +149,37 @@ def progress_of(s: Any, c: Any) -> float:
 
 
 @jit
+def watch_noise(s: Any, c: Any, dt: float) -> None:
+    """
+    Follow the median of the fast part of the disturbance (k2 + alpha1) xi2 + Phi sigm(xi2).
+
+    The median, because it does not see the reversals of the friction.
+
+    :param s: state record after `approximator.observe`: noise [1/s2] in and out.
+    :param c: settings record.
+    :param dt: time step [s].
+    """
+    d = (c.k2 + s.ah1) * s.xi2 + abs(s.phi) * min(max(s.xi2 / c.delta, -1.0), 1.0)
+    s.trend += min(dt / TREND, 1.0) * (d - s.trend)
+    grow = 1.0 + min(dt / MEDIAN, 1.0)
+    s.noise = s.noise * grow if abs(d - s.trend) > s.noise else max(s.noise / grow, LEAST_NOISE)
+
+
+@jit
+def cover_noise(s: Any, c: Any) -> None:
+    """
+    Raise the bound b1 where Phi would not keep the noise of the sensors below the threshold.
+
+    Friction that is small beside the noise would leave a Phi that noise passes now and then.
+
+    :param s: state record: b1 out.
+    :param c: settings record.
+    """
+    least = c.noise_factor * 1.4826 * s.noise / (1.0 + c.kappa)
+    s.b1 += max(0.0, least - honn.bound(s, 0.0))
+
+
+@jit
 def gated(c: Any, x: float) -> bool:
     """
     Tell whether a stop may push the stem or the plug force is too steep to be learned from.
@@ -187,9 +225,13 @@ def follow(s: Any, c: Any, phase: int, dt: float) -> None:
     """
     x = s.x1 - c.preload
     step = settled.track(s, x, c.play)
+    if abs(x - s.rest) > 2.0 * c.play:
+        s.rest = x
+        s.rested = s.elapsed
     if phase != PHASE_LEARN_PHI or gated(c, x):
         return
     s.travel += step
+    watch_noise(s, c, dt)
     if s.elapsed - s.moved < settled.FRESH:
         left = s.u - s.x1 - c.alpha1 / c.alpha5 * s.x2
         settled.collect(s, dt / settled.CORRELATION, s.x1, left)

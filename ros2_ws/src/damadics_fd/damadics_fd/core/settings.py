@@ -130,6 +130,8 @@ class Settings:
     t_w: float = _number('s', 'start of the learning of Phi', 0.0, 1e6, 0.0, 20.0)
     t_learn: float = _number('s', 'earliest end of learning', 0.0, 1e7, 0.0, 60.0)
     travel_min: float = _number('', 'stem travel / stroke that learning needs', 0.0, 1e6, 0.0, 0.5)
+    noise_factor: float = _number('', 'standard deviations of the noise that Phi and threshold '
+                                  'together keep off at least', 0.0, 100.0, 8.0, 8.0)
     play: float = _number('', 'motion within a play of this half width is no travel', 0.0, 0.5,
                           0.005, 0.005)
     settled_stiffness: float = _number('', 'change of the stiffness while learning that is '
