@@ -41,7 +41,8 @@ def write_report(source: Path, target: Path) -> list[Path]:
         raise ValueError(f'{source} holds no scenario: run evaluate run --out {source}')
     manifest = json.loads((source / MANIFEST).read_text(encoding='utf-8'))
     stated: dict[str, Any] = manifest['campaign']
-    campaign = Campaign(**{k: tuple(v) if isinstance(v, list) else v for k, v in stated.items()})
+    plain = {k: tuple(v) if isinstance(v, list) else v for k, v in stated.items()}
+    campaign = Campaign(**plain)  # type: ignore[arg-type]
     content = _content(campaign, results)
     paper = source / PAPER
     content['paper'] = json.loads(paper.read_text(encoding='utf-8')) if paper.exists() else None

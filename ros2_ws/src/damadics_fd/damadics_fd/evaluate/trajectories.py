@@ -25,7 +25,8 @@ Floats = NDArray[np.float64]
 NOISE = 1.414e-3  # standard deviation of the benchmark's sensor noise, share of full scale
 HOUR = 3600
 DAY = 86400
-PLANT_SEEDS = 4  # different disturbances of CV inside the plant; a run's seed picks one
+PLANT_SEEDS = 20  # different disturbances of CV inside the plant; a run's seed picks one
+LEARNING, FREE = 10_000, 20_000  # added to it, so that fault-free records share none
 DEVELOPMENT = {'S': 0.0, 'M': 0.0, 'B': 0.0, 'I': 86400.0}
 SHORT_DEVELOPMENT = {4: 3600.0, 13: 900.0, 17: 3600.0}
 CACHE_VARIABLE = 'DAMADICS_FD_CACHE'
@@ -59,7 +60,7 @@ class Case:
     @property
     def duration(self) -> int:
         """Return the length of the run, s."""
-        return int(self.zones.t_hor) + 1
+        return int(self.zones.t_hor)
 
 
 def case(name: str) -> Case:
@@ -159,11 +160,11 @@ def scenario_run(name: str, seed: int) -> tuple[Floats, Floats]:
 
 def learning_hour(seed: int) -> Floats:
     """Return the fault-free hour that belongs to a seed."""
-    clean, _ = trajectory('nominal', HOUR, seed % PLANT_SEEDS)
-    return noisy(clean, seed, 'learning hour')
+    clean, _ = trajectory('nominal', HOUR, seed % PLANT_SEEDS + LEARNING)
+    return noisy(clean[:HOUR], seed, 'learning hour')
 
 
 def nominal_day(seed: int) -> Floats:
     """Return a fault-free day that belongs to a seed, started afresh."""
-    clean, _ = trajectory('nominal', DAY, seed % PLANT_SEEDS)
-    return noisy(clean, seed, 'nominal day')
+    clean, _ = trajectory('nominal', DAY, seed % (10 * PLANT_SEEDS) + FREE)
+    return noisy(clean[:DAY], seed, 'nominal day')

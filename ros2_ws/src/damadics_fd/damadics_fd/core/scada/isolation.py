@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 
 from damadics_fd.core.jit import jit
 from damadics_fd.core.scada.actuator import F_RANGE, P_RANGE, T_RANGE, valve_flow
-from damadics_fd.core.scada.cusum import P1, P2, R1, R2, T1, TESTS
+from damadics_fd.core.scada.cusum import P1, P2, R2, T1, TESTS
 from damadics_fd.core.scada.model import FAULTS, STEM, STEM_FAULTS, advance_stem, copy_stem
 from damadics_fd.core.scada.step import HISTORY_LENGTH
 
-WINDOW = 900  # samples at most
+WINDOW = 600  # samples at most
 SHORTEST = 20
 MINIMUM_ERROR = 1e-12
 INCIPIENT_ONLY = frozenset({3, 4, 5, 6, 9})  # no physical background as abrupt faults
@@ -47,6 +47,7 @@ FLOW_FAULTS = frozenset({2, 3, 5, 6, 13, 18, 19})
 HYPOTHESES = tuple(n for n in NAMES if n not in (7, 17))
 GRID = (0.03, 0.15, 0.35, 0.6, 0.85)
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
+REFINED = 6  # hypotheses whose strength is refined
 
 
 @dataclass(frozen=True)
@@ -163,6 +164,7 @@ class Isolator:
         self._ref = reference
         self._stem = np.zeros(1, STEM)
         tests = [test.residual for test in TESTS]
+        self._nominal = (math.nan, math.nan)
         self._variance = (
             float(reference['s1']) ** 2,
             float(reference['sd'][tests.index(R2)]) ** 2 or 1.0,
@@ -185,7 +187,11 @@ class Isolator:
             test = int(state['test'])
             abrupt = test < len(TESTS) and TESTS[test].k0 >= 1.5
         shown = self._inputs(state, window)
-        ranking = [self._fit(window, fault) for fault in HYPOTHESES]
+        self._nominal = self._errors(window, None, None)
+        coarse = {fault: self._grid(window, fault) for fault in HYPOTHESES}
+        order = sorted(HYPOTHESES, key=lambda fault: min(coarse[fault])[0])
+        ranking = [self._refine(window, fault, coarse[fault]) for fault in order[:REFINED]]
+        ranking += [Hypothesis(fault, *min(coarse[fault])[::-1]) for fault in order[REFINED:]]
         if abrupt:
             ranking = [
                 Hypothesis(h.fault, h.strength, h.cost + ABRUPT_PRIOR)
@@ -223,6 +229,24 @@ class Isolator:
             return [Hypothesis(17, float(np.mean(window['p1'])) / mean[P1] - 1.0, 0.0)]
         return []
 
+    def _errors(
+        self, window: NDArray, stem: NDArray | None, flow: NDArray | None
+    ) -> tuple[float, float]:
+        """Return the mean squared errors of X' and F'; the nominal ones where no fault acts."""
+        nominal = np.zeros(1, FAULTS)
+        if stem is not None or flow is None:
+            faults = nominal if stem is None else stem
+            of_stem = _stem_error(window, self._act, faults[0], self._stem[0])
+        else:
+            of_stem = self._nominal[0]
+        if flow is not None or stem is None:
+            faults = nominal if flow is None else flow
+            g0, g1 = self._ref['g0'], self._ref['g1']
+            of_flow = _flow_error(window, self._act, faults[0], g0, g1)
+        else:
+            of_flow = self._nominal[1]
+        return float(of_stem), float(of_flow)
+
     def cost(self, window: NDArray, fault: int, strength: float) -> float:
         """
         Return the cost of one fault at one strength.
@@ -233,19 +257,19 @@ class Isolator:
         """
         faults = np.zeros(1, FAULTS)
         faults[f'f{fault}'] = strength
-        n = len(window)
-        total = 0.0
-        stem = faults if fault in STEM_FAULTS else np.zeros(1, FAULTS)
-        error = _stem_error(window, self._act, stem[0], self._stem[0])
-        total += 0.5 * n * math.log(max(error, self._variance[R1], MINIMUM_ERROR))
-        flow = faults if fault in FLOW_FAULTS else np.zeros(1, FAULTS)
-        error = _flow_error(window, self._act, flow[0], self._ref['g0'], self._ref['g1'])
-        if not math.isnan(error):
-            total += 0.5 * n * math.log(max(error, self._variance[R2], MINIMUM_ERROR))
+        stem, flow = self._errors(
+            window,
+            faults if fault in STEM_FAULTS else None,
+            faults if fault in FLOW_FAULTS else None,
+        )
+        n = 0.5 * len(window)
+        total = n * math.log(max(stem, self._variance[0], MINIMUM_ERROR))
+        if not math.isnan(flow):
+            total += n * math.log(max(flow, self._variance[1], MINIMUM_ERROR))
         return total
 
-    def _fit(self, window: NDArray, fault: int) -> Hypothesis:
-        """Fit the strength by a coarse grid, then golden section between its neighbours."""
+    def _grid(self, window: NDArray, fault: int) -> list[tuple[float, float]]:
+        """Return cost and strength on a coarse grid."""
         grid = [0.0, *GRID, 1.0]
         if fault in TWO_SIDED:
             grid = [*(-g for g in reversed(grid)), *grid[1:]]
@@ -254,14 +278,19 @@ class Isolator:
         if fault == 1:  # shows only where the stem meets its stop
             reached = 1.0 - float(np.quantile(window['x'], 0.98))
             grid = sorted({*grid, *(min(max(reached + d, 0.0), 1.0) for d in (-0.02, 0.0, 0.02))})
-        costs = [self.cost(window, fault, strength) for strength in grid]
-        i = min(range(len(grid)), key=costs.__getitem__)
-        low, high = grid[max(i - 1, 0)], grid[min(i + 1, len(grid) - 1)]
-        best = (costs[i], grid[i])
+        return [(self.cost(window, fault, strength), strength) for strength in grid]
+
+    def _refine(
+        self, window: NDArray, fault: int, grid: list[tuple[float, float]]
+    ) -> Hypothesis:
+        """Refine the best strength by golden section between its neighbours on the grid."""
+        i = grid.index(min(grid))
+        low, high = grid[max(i - 1, 0)][1], grid[min(i + 1, len(grid) - 1)][1]
+        best = grid[i]
         left, right = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
         at_left = self.cost(window, fault, left)
         at_right = self.cost(window, fault, right)
-        for _ in range(9):
+        for _ in range(7):
             best = min(best, (at_left, left), (at_right, right))
             if at_left < at_right:
                 high, right, at_right = right, left, at_left

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damadics_fd.core.jit import jit
-from damadics_fd.core.scada.cusum import P1, R1, R2, TESTS, siegmund_limit
+from damadics_fd.core.scada.cusum import P1, R1, TESTS, siegmund_limit
 from damadics_fd.core.scada.pressure import learn_pressure
 from damadics_fd.core.scada.settings import ScadaSettings
 from damadics_fd.core.scada.step import (
@@ -28,9 +28,8 @@ DAY_S = 86400.0
 LONG_RECORD = 3000  # samples below which the tails of r1 are not known well enough
 JUMP_CLIP = 6.0  # a jump must then last for three samples
 JUMP_MARGIN = 2.7
-REAL_FLOW_MARGIN = 1.0
 HEAD_ROOM = 1.3  # on the largest CUSUM of the learning record
-LLR_MARGIN = 2.2
+LLR_MARGIN = 1.6
 LLR_HEAD_ROOM = 2.0
 RIDGE = 1e-4
 STATIONARY = 1.3  # sigma of 30 s blocks over sigma of samples, above it an input wanders
@@ -185,7 +184,7 @@ def _held_out(phi: Floats, error: Floats, used: int) -> float:
 
 
 def _flow_residual(ref: Any, prediction: Prediction, flow: Floats) -> Floats:
-    """Fit F' = g0 + g1 f and return r2, NaN where flow or temperature is not measured."""
+    """Fit F' = g0 + g1 f and return r2, NaN where it is not measured or masked."""
     valid = ~np.isnan(prediction.f) & ~np.isnan(flow)
     fit = valid & ~prediction.masked
     ref['g1'] = 1.0
@@ -194,8 +193,7 @@ def _flow_residual(ref: Any, prediction: Prediction, flow: Floats) -> Floats:
         design = np.column_stack([np.ones(fit.sum()), prediction.f[fit]]) * weight[:, None]
         ref['g0'], ref['g1'] = np.linalg.lstsq(design, flow[fit] * weight, rcond=None)[0]
     r2 = (flow - ref['g0'] - ref['g1'] * prediction.f) / prediction.sq
-    r2[valid & prediction.masked] = 0.0
-    return np.where(valid, r2, np.nan)
+    return np.where(valid & ~prediction.masked, r2, np.nan)
 
 
 def _limits(
@@ -216,12 +214,10 @@ def _limits(
         if test.k0 == 4.0:
             quantile = NormalDist().inv_cdf(1.0 - 0.25 / n)
             sd *= max(1.0, float(np.abs(r - mu).max()) / sd / quantile)
-        k = test.k0 + (4.0 / math.sqrt(n) if test.block > 1 else 0.0)
+        k = test.k0 + (4.0 / math.sqrt(r.size) if test.block > 1 else 0.0)
         clip, margin = test.clip, test.margin
         if (wandering or n < LONG_RECORD) and test.residual == R1 and test.k0 == 4.0:
             clip, margin = JUMP_CLIP, JUMP_MARGIN
-        elif wandering and test.residual == R2 and test.k0 < 4.0:
-            margin = REAL_FLOW_MARGIN
         largest = cusum_maximum((r - mu) / sd, k, clip)
         ref['mu'][i], ref['sd'][i], ref['k'][i], ref['clip'][i] = mu, sd, k, clip
         ref['h'][i] = max(margin * siegmund_limit(k, arl), HEAD_ROOM * largest)

@@ -1,7 +1,7 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
 """
-Reduced stem model driven by 1 Hz samples: massless stem, Euler sub-steps of 5 ms.
+Reduced stem model driven by 1 Hz samples: massless stem, Euler sub-steps of 2.5 ms.
 
 Chamber pressure and air mass are two states, integrated separately as in DABLib: p V / (m_a R T)
 is not conserved through the play there, and a model with one state would drift away from it.
@@ -15,7 +15,7 @@ import numpy as np
 from damadics_fd.core.jit import jit
 from damadics_fd.core.scada.actuator import P_RANGE, pressure_recovery
 
-SUB_STEPS = 7
+SUB_STEPS = 14
 ATMOSPHERE = 101325.0
 GAS = 287.0 * 293.0
 MINIMUM_SUPPLY = 1.2e5

@@ -23,7 +23,8 @@ class ScadaSettings:
     :param wide_play: play of the second model of the friction test, share of stroke.
     :param gap_s: longest gap the models are carried over; a longer one restarts them.
     :param settle_s: no test for this time after such a restart.
-    :param saturated: F' and f beyond which the flow meter shows no more (two limits).
+    :param saturated: no flow test while the model's flow is above the second of these limits and
+        both F' and f are above the first: the flow meter shows no more than its range.
     :param actuator: nominal parameters.
     """
 
@@ -36,7 +37,7 @@ class ScadaSettings:
     wide_play: float = 0.03
     gap_s: float = 30.0
     settle_s: float = 120.0
-    saturated: tuple[float, float] = (0.97, 0.985)
+    saturated: tuple[float, float] = (0.94, 0.97)
     actuator: Actuator = field(default_factory=Actuator)
 
     def __post_init__(self) -> None:

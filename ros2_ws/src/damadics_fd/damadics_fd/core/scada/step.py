@@ -93,6 +93,7 @@ MONITOR = np.dtype(
             ('t_onset', np.float64),
             ('test', np.int64),
             ('ratios', np.float64, (N_TESTS + 1,)),
+            ('peaks', np.float64, (N_TESTS + 1,)),  # largest of the ratios so far
             ('history', HISTORY, (HISTORY_LENGTH,)),
         ],
     )
@@ -235,7 +236,12 @@ def predict_flow(
     fp = s.f / (2.0 * max(p1 - p2, 0.02))
     c = ref.pressure[0].c + ref.pressure[1].c
     s.sq = cfg.sigma * math.sqrt(1.0 + fx * fx + fp * fp * c)
-    s.masked = s.f > cfg.model_high and flow > cfg.flow_high
+    # the mask follows the model: one on the noisy f itself would select f's errors
+    s.masked = (
+        s.f > cfg.flow_high
+        and flow > cfg.flow_high
+        and nominal_flow(cfg.act, s.xm[0], p1, p2, t1) > cfg.model_high
+    )
 
 
 @jit
@@ -275,10 +281,10 @@ def decide(s: Any, ref: Any) -> None:
         value = s.residual[TEST_RESIDUAL[i]]
         if math.isnan(value) or not ref.sd[i] > 0.0:
             continue
+        if s.masked and TEST_RESIDUAL[i] == R2:
+            continue
         z = (value - ref.mu[i]) / ref.sd[i]
         z = min(max(z, -ref.clip[i]), ref.clip[i])
-        if TEST_RESIDUAL[i] == R2 and s.masked:
-            z = 0.0
         for side in range(2):
             g = s.g[i, side] + (z if side == 0 else -z) - ref.k[i]
             if g <= 0.0:
@@ -303,6 +309,8 @@ def decide(s: Any, ref: Any) -> None:
         s.ratio = s.ratios[FRICTION_TEST]
         s.worst = FRICTION_TEST
         onset = s.llr_zero
+    for i in range(N_TESTS + 1):
+        s.peaks[i] = max(s.peaks[i], s.ratios[i])
     if s.ratio >= 1.0 and not s.alarm:
         s.alarm = True
         s.t_alarm = s.t
