@@ -53,6 +53,10 @@ def _parser() -> argparse.ArgumentParser:
         '--nominal-days', type=int, default=0, metavar='N',
         help='further fault-free days on which false alarms are counted (0)',
     )  # fmt: skip
+    run.add_argument(
+        '--isolated-seeds', type=int, default=5, metavar='N',
+        help='seeds for which the faults are also isolated (5)',
+    )  # fmt: skip
     run.add_argument('--debounce', type=int, default=1, metavar='N', help='samples (1)')
     run.add_argument('--jobs', type=int, metavar='N', help='processes (one per core)')
     run.add_argument('--scheduler', metavar='ADDRESS', help='Dask scheduler, tcp://host:port')
@@ -95,6 +99,7 @@ def _run(arguments: argparse.Namespace) -> None:
         calibration_days=arguments.calibration_days,
         nominal_days=arguments.nominal_days,
         debounce=arguments.debounce,
+        isolated_seeds=arguments.isolated_seeds,
     )
     results = run_campaign(campaign, arguments.out, arguments.jobs, arguments.scheduler)
     print(f'{len(results)} results in {arguments.out}')

@@ -61,8 +61,7 @@ def run_campaign(
     :param scheduler: address of a Dask scheduler, such as tcp://host:8786, instead of processes.
     """
     directory.mkdir(parents=True, exist_ok=True)
-    manifest = {'campaign': asdict(campaign), 'versions': versions()}
-    (directory / MANIFEST).write_text(json.dumps(manifest, indent=2), encoding='utf-8')
+    _write_manifest(campaign, directory)
     earlier = read_results(directory) if (directory / RESULTS).exists() else []
     hashes = {name: campaign.settings_hash(name) for name in campaign.detectors}
     kept = [r for r in earlier if hashes.get(r['detector']) == r['settings_hash']]
@@ -72,6 +71,20 @@ def run_campaign(
         limit = limits(campaign, [r for r in kept if r['kind'] == 'nominal'])
         kept += _collect(executor, directory, _scenario_units(campaign, limit, done), 'scenarios')
     return kept
+
+
+def _write_manifest(campaign: Campaign, directory: Path) -> None:
+    """Write what was run here, all calls together."""
+    file = directory / MANIFEST
+    stated = asdict(campaign)
+    if file.exists():
+        earlier = json.loads(file.read_text(encoding='utf-8'))['campaign']
+        for name in ('scenarios', 'detectors', 'seeds'):
+            stated[name] = list(dict.fromkeys((*earlier[name], *stated[name])))
+        for name in ('nominal_days', 'isolated_seeds'):
+            stated[name] = max(earlier[name], stated[name])
+    manifest = {'campaign': stated, 'versions': versions()}
+    file.write_text(json.dumps(manifest, indent=2), encoding='utf-8')
 
 
 def _key(result: Result) -> tuple[Any, ...]:

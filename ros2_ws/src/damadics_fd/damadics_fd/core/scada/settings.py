@@ -31,7 +31,7 @@ class ScadaSettings:
     period_s: float = 1.0
     t_on_s: float = 300.0
     learn_from_s: float = 60.0
-    learn_s: float = 3600.0
+    learn_s: float = 900.0
     days_per_false_alarm: float = 30.0
     sigma: float = 0.001414
     wide_play: float = 0.03
