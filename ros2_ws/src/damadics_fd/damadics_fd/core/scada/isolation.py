@@ -275,6 +275,8 @@ class Isolator:
             grid = [*(-g for g in reversed(grid)), *grid[1:]]
         if fault == 13:
             grid = [g for g in grid if g > -0.7]  # X' stays positive
+        if fault == 15:  # a play as wide as the motion: the cost has several minima
+            grid = [0.1 * i for i in range(11)]
         if fault == 1:  # shows only where the stem meets its stop
             reached = 1.0 - float(np.quantile(window['x'], 0.98))
             grid = sorted({*grid, *(min(max(reached + d, 0.0), 1.0) for d in (-0.02, 0.0, 0.02))})

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from damadics_fd.core.jit import jit
 from damadics_fd.core.scada.actuator import F_RANGE, P_RANGE, T_RANGE, TPH_PER_KGS
 from damadics_fd.core.scada.cusum import TEST_NAMES
+from damadics_fd.core.scada.isolation import Isolation, Isolator
 from damadics_fd.core.scada.learning import LearningError, learn
 from damadics_fd.core.scada.settings import ScadaSettings
 from damadics_fd.core.scada.step import MONITOR, REFERENCE, accepts, predict, residuals, step
@@ -229,6 +230,12 @@ class ScadaMonitor:
         if self.reference is not None:
             count = _run(self._state, self._record, self.reference, samples[start:], trace)
         return np.concatenate((learned, trace[:count])) if len(learned) else trace[:count]
+
+    def isolate(self) -> Isolation | None:
+        """Rank the faults that explain the record since the onset; None without an alarm."""
+        if self.reference is None:
+            return None
+        return Isolator(self._record[0], self.reference[0]).isolate(self.state)
 
     def _learn_from(
         self, samples: Floats, start: int, learned: NDArray

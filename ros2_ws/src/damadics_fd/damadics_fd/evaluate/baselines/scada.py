@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damadics_fd.core.scada.cusum import TEST_NAMES
-from damadics_fd.core.scada.isolation import Isolation, Isolator
+from damadics_fd.core.scada.isolation import Isolation
 from damadics_fd.core.scada.learning import learn
 from damadics_fd.core.scada.monitor import ScadaMonitor
 from damadics_fd.core.scada.settings import ScadaSettings
@@ -93,15 +93,13 @@ class Scada(Detector):
         :return: one isolation per time at which the record sufficed.
         """
         self.monitor.reset()
-        assert self.monitor.reference is not None, 'fit first'
-        isolator = Isolator(self._settings.record()[0], self.monitor.reference[0])
         found = []
         done = 0
         for time in times:
             until = int(np.searchsorted(samples[:, 0], time, side='right'))
             self.monitor.run_samples(samples[done:until])
             done = until
-            isolation = isolator.isolate(self.monitor.state)
+            isolation = self.monitor.isolate()
             if isolation is not None:
                 found.append(isolation)
         return found
