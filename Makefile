@@ -3,12 +3,13 @@
 SHELL := /bin/bash
 PYTHON ?= python3
 ARGS ?=
+SEEDS ?= 1
 ENV := source ./env.sh
 BUILT := ros2_ws/install/.built
 SOURCES := $(shell find ros2_ws/src -type f -not -name '*.pyc' -not -path '*/__pycache__/*' \
 	-not -path '*/test/*' -not -path '*/.pytest_cache/*')
 
-.PHONY: help demo test build env lint clean
+.PHONY: help demo test report build env lint clean
 
 help: ## show what can be made
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 18
@@ -18,6 +19,11 @@ demo: $(BUILT) ## the paper's two experiments through the running nodes: table, 
 
 test: $(BUILT) ## run all tests
 	@$(ENV) && python -m pytest -m 'not slow' $(ARGS)
+
+report: $(BUILT) ## the benchmark's 44 scenarios x all detectors: docs/results/ (minutes; more: SEEDS=20)
+	@$(ENV) && ros2 run damadics_fd evaluate run --out results/campaign --seeds $(SEEDS) --no-report \
+		&& ros2 run damadics_fd evaluate paper results/campaign \
+		&& ros2 run damadics_fd evaluate report results/campaign --to docs/results
 
 build: $(BUILT) ## set up .venv and build the ROS 2 workspace
 

@@ -21,12 +21,15 @@ from damadics_fd.core.estimator import Estimator
 from damadics_fd.core.events import Event
 from damadics_fd.core.pipeline import Result, run
 from damadics_fd.core.quality import REASONS
+from damadics_fd.core.scada.cusum import TEST_NAMES
 from damadics_fd.core.scada.monitor import ScadaMonitor
 from damadics_fd.core.settings import Settings
 from damadics_fd.thinning import Thinner
 
 MODES = ('paper', 'monitor', 'scada')
 NANO = 1e9
+NAMING_S = (30.0, 300.0, np.inf)  # after an alarm; a later fault must not change the name
+STRIDE = 120  # rows between two attempts of mode scada to name a fault
 PIECE = 8192  # rows judged at once: they fit the cache, and calls cost nothing against them
 
 
@@ -121,11 +124,20 @@ class Scada:
         self._alarm = False
         self._samples = 0
         self._accepted = 0
+        self._detections: list[dict[str, Any]] = []
+        self._named = 0
 
     def take(self, columns: Columns, zero: int) -> tuple[list[dict[str, Any]], Result | None]:
         """Judge the next columns."""
         if not {'p1', 'p2'} <= columns.keys():
             raise BagError('mode scada needs the pressures p1 and p2')
+        found = []
+        for first in range(0, len(columns['stamp']), STRIDE):
+            part = {name: values[first:first + STRIDE] for name, values in columns.items()}
+            found += self._judge(part, zero)
+        return found, None
+
+    def _judge(self, columns: Columns, zero: int) -> list[dict[str, Any]]:
         trace = self._monitor.run(columns)
         self._samples += len(columns['stamp'])
         self._accepted += len(trace)
@@ -133,14 +145,35 @@ class Scada:
         before = np.concatenate(([self._alarm], alarm[:-1]))
         if len(alarm):
             self._alarm = bool(alarm[-1])
-        return [
+        found = [
             {
                 't': float(row['t'] - zero / NANO), 'stamp': round(float(row['t']) * NANO),
                 'residual_x': float(row['r1']), 'residual_flow': float(row['r2']),
                 'ratio': float(row['ratio']),
+                'test': TEST_NAMES[int(self._monitor.state.test)],
+                'onset': float(self._monitor.state.t_onset) - zero / NANO,
+                'text': 'too short a record to name the fault',
             }
             for row in trace[alarm & ~before]
-        ], None
+        ]
+        self._detections += found
+        self._name()
+        return found
+
+    def _name(self) -> None:
+        """Name the fault in the evidence of the alarm while the record since it is short."""
+        if not self._detections:
+            return
+        state = self._monitor.state
+        since = float(state.t - state.t_alarm)
+        if since < NAMING_S[self._named] or self._named == len(NAMING_S) - 1:
+            return
+        self._named += 1
+        isolation = self._monitor.isolate()
+        if isolation is not None:
+            self._detections[-1]['text'] = isolation.text()
+            self._detections[-1]['cause'] = f'f{isolation.best.fault}'
+            self._detections[-1]['strength'] = isolation.best.strength
 
     @property
     def refused(self) -> dict[str, int]:
