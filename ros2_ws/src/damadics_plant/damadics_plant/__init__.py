@@ -10,10 +10,12 @@ The DAMADICS actuator: control valve, servomotor and positioner with the benchma
 """
 
 from damadics_plant.faults import CATALOGUE, Fault
-from damadics_plant.library import ScenarioError, load_scenario, read_scenarios, scenario_names
+from damadics_plant.library import load_scenario, scenario_names
 from damadics_plant.parameters import Actuator, LuGreActuator
+from damadics_plant.run import Run
 from damadics_plant.scenario import Scenario
-from damadics_plant.simulator import Run, Simulator, simulate
+from damadics_plant.scenario_file import ScenarioError, read_scenarios
+from damadics_plant.simulator import Simulator, simulate
 
 __all__ = [
     'CATALOGUE', 'Actuator', 'Fault', 'LuGreActuator', 'Run', 'Scenario', 'ScenarioError',

@@ -3,25 +3,35 @@
 """The command `simulate`: scenarios to CSV or MCAP files, as fast as the machine can."""
 
 import argparse
+import re
+import signal
 import sys
-from collections.abc import Sequence
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from threading import Event
+from typing import Any
 
 from damadics_fd.bag.errors import BagError
 
-from damadics_plant.faults import Fault
+from damadics_plant.campaign import ALL, Job, run_all, run_one
+from damadics_plant.faults import CATALOGUE, Fault
 from damadics_plant.library import load_scenario, scenario_names
+from damadics_plant.recorded import read_recorded
 from damadics_plant.scenario import Scenario
-from damadics_plant.simulator import MODELS, Simulator
-from damadics_plant.writer import open_writer
+from damadics_plant.simulator import MODELS
 
 _EXAMPLE = """\
 examples:
   simulate --list
   simulate paper_friction --out friction.mcap
   simulate nominal --fault f11 --strength 0.5 --from 70 --out spring.csv --noise --seed 3
+  simulate nominal --cv 'plant.csv:LC74_20CV*0.01' --duration 3600 --rate 1 --out replayed.csv
+  simulate all44 --rate 1 --out scenarios/
 """
+_INTERRUPTED = 130
 
 
 def parser() -> argparse.ArgumentParser:
@@ -33,15 +43,27 @@ def parser() -> argparse.ArgumentParser:
     p = argparse.ArgumentParser(
         prog='simulate', description='Simulate the DAMADICS actuator.', epilog=_EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter)
-    p.add_argument('scenario', nargs='?', help='a name of --list, or FILE.yaml[:NAME]')
-    p.add_argument('--out', type=Path, help='FILE.csv or FILE.mcap')
+    p.add_argument('scenario', nargs='*', metavar='SCENARIO',
+                   help=f'names of --list, FILE.yaml[:NAME], fN@STRENGTH, or {ALL}')
+    p.add_argument('--out', type=Path, metavar='PATH',
+                   help='FILE.csv or FILE.mcap; a folder where there are several scenarios')
+    p.add_argument('--format', choices=('csv', 'mcap'), default='csv',
+                   help='of the files in the folder')
+    p.add_argument('--scada', type=Path, metavar='FILE',
+                   help='write the same run at 1 Hz here, too')
     p.add_argument('--list', action='store_true', help='list the scenarios and exit')
+    p.add_argument('--faults', action='store_true', help='list the faults and exit')
     p.add_argument('--model', choices=list(MODELS), default='dablib')
     p.add_argument('--rate', type=float, metavar='HZ',
-                   help='samples per second (dablib: 400, lugre: 200)')
-    p.add_argument('--duration', type=float, metavar='S', help='end the run after S seconds')
+                   help='samples per second (default: dablib 400, lugre 200)')
+    p.add_argument('--duration', type=float, metavar='S', help='length of the run')
     p.add_argument('--noise', action='store_true', help="add the benchmark's disturbances")
     p.add_argument('--seed', type=int, default=0, metavar='N', help='of noise and random inputs')
+    p.add_argument('--quiet', action='store_true', help='no progress bar')
+    inputs = p.add_argument_group(
+        'recorded inputs', 'FILE.csv:COLUMN[*FACTOR] or BAG:FIELD[*FACTOR], factor to SI')
+    for name in ('cv', 'p1', 'p2', 't1'):
+        inputs.add_argument(f'--{name}', metavar='SOURCE')
     fault = p.add_argument_group('a fault of your own, instead of those of the scenario')
     fault.add_argument('--fault', metavar='fN', help='f1 .. f19')
     fault.add_argument('--strength', type=float, default=1.0, metavar='S',
@@ -55,20 +77,57 @@ def parser() -> argparse.ArgumentParser:
     return p
 
 
-def scenario_from(arguments: argparse.Namespace) -> Scenario:
+def scenario_from(name: str, arguments: argparse.Namespace) -> Scenario:
     """
-    Find the scenario and apply the options that change it.
+    Find a scenario and apply the options that change it.
 
+    :param name: of the scenario.
     :param arguments: parsed command line.
     :return: what to run.
     :raises ValueError: if a value is not admissible.
     """
-    scenario = load_scenario(arguments.scenario)
+    scenario = load_scenario(name)
+    for signal_name in ('cv', 'p1', 'p2', 't1'):
+        source = getattr(arguments, signal_name)
+        if source:
+            match = re.fullmatch(r'(.+?):([^:*]+)(?:\*([-+.\deE]+))?', source)
+            if not match:
+                raise ValueError(f'--{signal_name}: {source!r} is not FILE:COLUMN[*FACTOR]')
+            recorded = read_recorded(Path(match[1]), match[2], float(match[3] or 1))
+            changes: dict[str, Any] = {signal_name: recorded}
+            scenario = replace(scenario, **changes)
     if arguments.fault:
         fault = Fault(arguments.fault, arguments.strength, arguments.start,
                       arguments.development, arguments.end)
         scenario = replace(scenario, faults=(fault,))
+    if arguments.duration is not None:
+        scenario = replace(scenario, duration=arguments.duration)
     return scenario
+
+
+@contextmanager
+def _stop_on_signal() -> Iterator[Event]:
+    """Turn SIGINT and SIGTERM into an event, so that a file ends with a whole block."""
+    stop = Event()
+    old = {
+        number: signal.signal(number, lambda *_: stop.set())
+        for number in (signal.SIGINT, signal.SIGTERM)
+    }
+    try:
+        yield stop
+    finally:
+        for number, handler in old.items():
+            signal.signal(number, handler)
+
+
+def _print_lists(arguments: argparse.Namespace) -> None:
+    if arguments.list:
+        for name in scenario_names():
+            scenario = load_scenario(name)
+            print(f'{name:15} {scenario.duration:7g} s  {scenario.description}')
+    if arguments.faults:
+        for kind in CATALOGUE.values():
+            print(f'{kind.key:4} {kind.minimum:2g}..1  {kind.name}: {kind.meaning}')
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -80,21 +139,35 @@ def main(args: Sequence[str] | None = None) -> int:
     """
     p = parser()
     arguments = p.parse_args(args)
-    if arguments.list:
-        for name in scenario_names():
-            print(f'{name:16} {load_scenario(name).description}')
+    if arguments.list or arguments.faults:
+        _print_lists(arguments)
         return 0
     if not arguments.scenario or not arguments.out:
         p.error('wants a scenario and --out FILE.csv or FILE.mcap (or --list)')
+    names = list(arguments.scenario)
+    if ALL in names:
+        standard = [name for name in scenario_names() if re.match(r'f\d', name)]
+        names[names.index(ALL):names.index(ALL) + 1] = standard
+    warnings.showwarning = lambda message, *_: print(f'simulate: {message}', file=sys.stderr)
     try:
-        simulator = Simulator(scenario_from(arguments), arguments.rate, arguments.model,
-                              arguments.noise, arguments.seed, arguments.duration)
-        with open_writer(arguments.out) as write:
-            while not simulator.finished:
-                write(simulator.advance(1 << 14))
+        jobs = [
+            Job(scenario_from(name, arguments), arguments.out, arguments.rate, arguments.model,
+                arguments.noise, arguments.seed)
+            for name in names
+        ]
+        with _stop_on_signal() as stop:
+            if len(jobs) == 1 and arguments.out.suffix:
+                done = run_one(jobs[0], stop, arguments.scada, bar=not arguments.quiet)
+            elif arguments.scada:
+                raise ValueError('--scada: goes with a single scenario and --out FILE')
+            else:
+                done = run_all(jobs, arguments.format, stop, bar=not arguments.quiet)
     except (ValueError, OSError, BagError) as error:
         print(f'simulate: {error}', file=sys.stderr)
         return 1
+    if not done:
+        print(f'simulate: interrupted; what is in {arguments.out} is valid', file=sys.stderr)
+        return _INTERRUPTED
     return 0
 
 

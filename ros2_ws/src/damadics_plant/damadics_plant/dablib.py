@@ -100,7 +100,7 @@ def simulate_block(state: Any, constants: Any, faults: Any, f: Any, effects: Any
     :param inputs: CV at the positioner, P1 [Pa], P2 [Pa], T1 [degC]; shape (4, steps).
     :param rate: steps per second, 400.
     :param every: steps per sample; the first step of the block is sampled.
-    :param out: receives `OUTPUTS`; shape (8, ceil(steps / every)).
+    :param out: receives the rows of `measure`; shape (`ROWS`, ceil(steps / every)).
     """
     s, a, e = state[0], constants[0], effects[0]
     h = 1.0 / rate

@@ -43,16 +43,18 @@ class Disturbance:
         }
 
     @staticmethod
-    def hum(first: int, n: int, rate: float) -> np.ndarray:
+    def hum(first: int, every: int, n: int, rate: float) -> np.ndarray:
         """
         Evaluate the 50 Hz hum.
 
         :param first: first tick.
-        :param n: number of ticks.
+        :param every: ticks per sample.
+        :param n: number of samples.
         :param rate: ticks per second.
         :return: share of the range, shape (n,).
         """
-        return HUM * np.sin(2 * np.pi * np.mod(50.0 * np.arange(first, first + n) / rate, 1.0))
+        ticks = np.arange(first, first + n * every, every)
+        return HUM * np.sin(2 * np.pi * np.mod(50.0 * ticks / rate, 1.0))
 
     def disturb(self, name: str, values: np.ndarray, every: int, hum: np.ndarray) -> np.ndarray:
         """

@@ -148,7 +148,7 @@ def simulate_block(state: Any, constants: Any, faults: Any, f: Any, effects: Any
     :param inputs: CV at the positioner, P1 [Pa], P2 [Pa], T1 [degC]; shape (4, ticks).
     :param rate: ticks per second, each of as many substeps as needed.
     :param every: ticks per sample; the first tick of the block is sampled.
-    :param out: receives `OUTPUTS`; shape (8, ceil(ticks / every)).
+    :param out: receives the rows of `measure`; shape (`ROWS`, ceil(ticks / every)).
     """
     s, a, e = state[0], constants[0], effects[0]
     substeps = int(math.ceil(1.0 / (rate * SUBSTEP) - 1e-9))

@@ -9,7 +9,9 @@ from damadics_plant.physics import Record
 from damadics_plant.valve import compressibility, valve_flow, water_density
 
 OUTPUTS = ('x1', 'p1', 'p2', 't1', 'flow', 'ps', 'fault', 'strength')
-"""Rows of the output of a model, in SI."""
+"""Rows of the output of a model, in SI; the last row after them is the true flow [kg/s]."""
+
+ROWS = len(OUTPUTS) + 1
 
 
 @jit
@@ -27,7 +29,7 @@ def measure(xr: float, x: float, ps: float, p1: float, p2: float, t1: float,
     :param pv: its vapour pressure [Pa].
     :param a: constants of the actuator.
     :param e: effects of the faults.
-    :param out: receives `OUTPUTS`; shape (8,).
+    :param out: receives `OUTPUTS` and the true flow; shape (`ROWS`,).
     """
     p = max(p1, pv)
     density = water_density(t1) / (1.0 - compressibility(t1) * p)
@@ -40,3 +42,4 @@ def measure(xr: float, x: float, ps: float, p1: float, p2: float, t1: float,
     out[5] = ps * e.ps_sensor
     out[6] = e.number
     out[7] = e.strength
+    out[8] = flow / 3.6

@@ -3,8 +3,8 @@
 """Run a scenario on one of the plants: all at once or block by block, with the same result."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+import warnings
+from collections.abc import Callable, Iterator
 from types import ModuleType
 from typing import Any
 
@@ -13,14 +13,13 @@ import numpy as np
 from damadics_plant import dablib, lugre
 from damadics_plant.disturbance import Disturbance
 from damadics_plant.faults import CATALOGUE, EFFECTS_DTYPE, Fault, fault_table
+from damadics_plant.level import LevelLoop
 from damadics_plant.library import load_scenario
-from damadics_plant.measure import OUTPUTS
+from damadics_plant.measure import OUTPUTS, ROWS
 from damadics_plant.parameters import Actuator, LuGreActuator
+from damadics_plant.run import Columns, Run, stamps
 from damadics_plant.scenario import Scenario
 from damadics_plant.sources import RandomSteps, Source
-
-COLUMNS = ('stamp', 'cv', *OUTPUTS)
-"""Columns of a run."""
 
 MODELS: dict[str, tuple[type[Actuator], ModuleType]] = {
     'dablib': (Actuator, dablib),
@@ -29,75 +28,6 @@ MODELS: dict[str, tuple[type[Actuator], ModuleType]] = {
 
 _BLOCK = 1 << 14
 """Ticks per call of the compiled loop: bounds memory, keeps the inputs in the cache."""
-
-Columns = dict[str, np.ndarray]
-
-
-@dataclass(frozen=True)
-class Run(Mapping[str, np.ndarray]):
-    """
-    A finished run: a mapping of names to columns, which are also attributes; `t` in s.
-
-    `stamp` int64 [ns], `cv x1 p1 p2 t1 flow ps` float64 in SI, `fault` int64 (0 while none is
-    active), `strength` float64; shape (n,) each.
-    """
-
-    scenario: Scenario
-    columns: Columns
-
-    def __getattr__(self, name: str) -> np.ndarray:
-        """
-        Return a column.
-
-        :param name: of the column, or `t` for the time in s.
-        :return: shape (n,).
-        :raises AttributeError: if there is no such column.
-        """
-        if name == 't':
-            return self.columns['stamp'] / 1e9
-        if name.startswith('__') or name not in self.columns:
-            raise AttributeError(f'a run has no column {name!r}; it has t, {", ".join(COLUMNS)}')
-        return self.columns[name]
-
-    def __getitem__(self, name: str) -> np.ndarray:
-        """
-        Return a column.
-
-        :param name: one of `COLUMNS`.
-        :return: shape (n,).
-        """
-        return self.columns[name]
-
-    def __iter__(self) -> Iterator[str]:
-        """
-        Go through the names of the columns.
-
-        :return: iterator of names.
-        """
-        return iter(self.columns)
-
-    def __len__(self) -> int:
-        """
-        Count the columns.
-
-        :return: number of columns.
-        """
-        return len(self.columns)
-
-    def view(self, rate: float) -> 'Run':
-        """
-        Return what a slower recorder sees of this run, for instance SCADA at 1 Hz.
-
-        :param rate: samples per second, a divisor of this run's.
-        :return: the run with every n-th sample.
-        :raises ValueError: if the rate does not divide.
-        """
-        own = 1e9 / (self.columns['stamp'][1] - self.columns['stamp'][0])
-        every = round(own / rate)
-        if every < 1 or not math.isclose(every * rate, own, rel_tol=1e-6):
-            raise ValueError(f'rate: {rate:g} Hz does not divide the rate of the run, {own:g} Hz')
-        return Run(self.scenario, {k: v[::every] for k, v in self.columns.items()})
-
 
 class Simulator:
     """
@@ -138,12 +68,16 @@ class Simulator:
         self._state: Any = module.initial_state(self.actuator)
         self._strengths = np.zeros(20)
         self._faults = [_admissible(fault, self.actuator) for fault in self.scenario.faults]
+        if len(self._faults) > 1:
+            warnings.warn(f'{self.scenario.name}: the benchmark allows one fault at a time, '
+                          f'here are {len(self._faults)}', stacklevel=2)
         self._lay_out_faults()
         names = ('cv', 'p1', 'p2', 't1')
         self._sources: list[Source] = [
-            source.seeded(seed) if isinstance(source, RandomSteps) else source
-            for source in (getattr(self.scenario, name) for name in names)
+            _fresh(getattr(self.scenario, name), seed) for name in names
         ]
+        self._loop = self._sources[0] if isinstance(self._sources[0], LevelLoop) else None
+        self._inflow = 0.0  # sum over the ticks of the loop's present period [kg/s]
         self._override: float | None = None
         self._disturbance = Disturbance(seed) if noise else None
         self._noisy_outputs = noise is True
@@ -190,7 +124,7 @@ class Simulator:
         for first in range(0, n, step):
             self._fill(out[:, first:first + step])
         k = np.arange(self._done - n, self._done, dtype=np.int64)
-        columns: Columns = {'stamp': _stamps(k, self.rate)}
+        columns: Columns = {'stamp': stamps(k, self.rate)}
         columns.update(zip(('cv', *OUTPUTS), out, strict=True))
         columns['fault'] = columns['fault'].astype(np.int64)
         return columns
@@ -229,28 +163,59 @@ class Simulator:
         self._effects = np.zeros(1, EFFECTS_DTYPE)
 
     def _fill(self, out: np.ndarray) -> None:
-        n = out.shape[1]
+        """Fill samples (rows CV and `OUTPUTS`), the loop's period by period."""
         first = self._done * self._every
-        t = np.arange(first, first + n * self._every) / self._tick_rate
+        if self._loop:
+            ticks = out.shape[1] * self._every
+            parts = [self._run_loop(k, n) for k, n in self._periods(first, ticks)]
+            out[:] = np.concatenate(parts, axis=1)[:, ::self._every]
+        else:
+            out[:] = self._run(first, out.shape[1], self._every)[:-1]
+        if self._disturbance and self._noisy_outputs:
+            hum = self._disturbance.hum(first, self._every, out.shape[1], self._tick_rate)
+            for row, name in zip(out[1:], OUTPUTS[:6], strict=False):
+                row[:] = self._disturbance.disturb(name, row, self._every, hum)
+        self._done += out.shape[1]
+
+    def _run(self, first: int, n: int, every: int) -> np.ndarray:
+        """Run n samples from a tick on; return rows CV, `OUTPUTS` and the true flow."""
+        t = np.arange(first, first + n * every) / self._tick_rate
         inputs = np.empty((4, len(t)))
         for row, source in zip(inputs, self._sources, strict=True):
             row[:] = source.at(t)
         if self._override is not None:
             inputs[0] = self._override
-        out[0] = inputs[0, ::self._every]
-        np.clip(inputs[0], 0.0, 1.024, out=inputs[0])
-        noise = self._disturbance
-        if noise:
-            hum = noise.hum(first, len(t), self._tick_rate)
-            inputs[0] = noise.disturb('cv', inputs[0], 1, hum)
-        outputs = np.empty((len(OUTPUTS), n))  # contiguous, so that there is one compiled version
+        out = np.empty((1 + ROWS, n))
+        out[0] = inputs[0, ::every]
+        if self._disturbance:
+            hum = self._disturbance.hum(first, 1, len(t), self._tick_rate)
+            inputs[0] = self._disturbance.disturb('cv', inputs[0], 1, hum)
+        rows = np.empty((ROWS, n))  # contiguous, so that there is one compiled version
         self._advance(self._state, self._constants, self._table, self._strengths, self._effects,
-                      inputs, self._tick_rate, self._every, outputs)
-        out[1:] = outputs
-        if noise and self._noisy_outputs:
-            for row, name in zip(out[1:], OUTPUTS[:6], strict=False):
-                row[:] = noise.disturb(name, row, self._every, hum[::self._every])
-        self._done += n
+                      inputs, self._tick_rate, every, rows)
+        out[1:] = rows
+        return out
+
+    def _periods(self, first: int, n: int) -> Iterator[tuple[int, int]]:
+        """Cut ticks at the sample times of the loop's controller."""
+        assert self._loop
+        period = max(1, round(self._loop.period * self._tick_rate))
+        k = first
+        while k < first + n:
+            if k % period == 0:
+                if k > 0:
+                    self._loop.fill((k - period) / self._tick_rate, self._inflow / period)
+                self._loop.control()
+                self._inflow = 0.0
+            end = min(first + n, k - k % period + period)
+            yield k, end - k
+            k = end
+
+    def _run_loop(self, first: int, n: int) -> np.ndarray:
+        rows = self._run(first, n, 1)
+        for flow in rows[-1].tolist():  # in order, so that blocks do not change the sum
+            self._inflow += flow
+        return rows[:-1]
 
 
 def simulate(scenario: str | Scenario, rate: float | None = None,
@@ -275,6 +240,12 @@ def simulate(scenario: str | Scenario, rate: float | None = None,
     """
     simulator = Simulator(scenario, rate, model, noise, seed, duration)
     return Run(simulator.scenario, simulator.advance(simulator.samples))
+
+
+def _fresh(source: Source, seed: int) -> Source:
+    if isinstance(source, RandomSteps):
+        return source.seeded(seed)
+    return source.fresh() if isinstance(source, LevelLoop) else source
 
 
 def _actuator(model: str | Actuator) -> Actuator:
@@ -308,11 +279,3 @@ def _ticks(rate: float, model: str) -> tuple[float, int]:
         return dablib.RATE, every
     every = math.ceil(lugre.RATE / rate - 1e-9)
     return rate * every, every
-
-
-def _stamps(k: np.ndarray, rate: float) -> np.ndarray:
-    if rate >= 1 and rate == int(rate):
-        whole, rest = np.divmod(k, int(rate))
-        stamps: np.ndarray = whole * 1_000_000_000 + np.rint(rest * 1e9 / rate).astype(np.int64)
-        return stamps
-    return np.rint(k * 1e9 / rate).astype(np.int64)

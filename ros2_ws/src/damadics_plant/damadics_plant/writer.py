@@ -10,6 +10,9 @@ import numpy as np
 
 CSV_COLUMNS = ('t', 'cv', 'x1', 'p1', 'p2', 't1', 'flow', 'ps', 'fault', 'strength')
 
+BYTES_PER_SAMPLE = 150
+"""About the size of a sample in either kind of file."""
+
 Write = Callable[[Mapping[str, np.ndarray]], None]
 
 
@@ -42,10 +45,12 @@ def open_writer(path: Path) -> Iterator[Write]:
 
 
 def _mcap(path: Path) -> Iterator[Write]:
+    from damadics_fd.bag.definition import schema_text
     from damadics_fd.bag.rosbag2 import qos
     from damadics_fd.bag.writer import BagWriter
 
     signals = ('cv', 'x1', 'p1', 'p2', 't1', 'flow', 'ps')
+    schema_text('damadics_msgs/msg/Measurement')  # refused before there is a file
     with BagWriter(path) as bag:
         bag.add_topic('/measurement', 'damadics_msgs/msg/Measurement', [qos(depth=1000)])
         bag.add_topic('/fault_state', 'damadics_msgs/msg/FaultState', [qos(depth=1000)])

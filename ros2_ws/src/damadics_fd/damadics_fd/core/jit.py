@@ -32,12 +32,15 @@ def jit(function: F) -> F:
     """
     Compile a function with numba, keeping IEEE arithmetic in source order.
 
+    Other threads run while it does.
+
     :param function: a function of scalars and arrays; its state is a structured array.
     :return: the compiled function. With `NUMBA_DISABLE_JIT=1` the same source runs uncompiled.
     """
     before = settings.CACHE_DIR
     settings.CACHE_DIR = before or _cache(Path(function.__code__.co_filename).parent)
     try:
-        return cast(F, numba.njit(cache=True, fastmath=False, error_model='numpy')(function))
+        compiled = numba.njit(cache=True, nogil=True, fastmath=False, error_model='numpy')
+        return cast(F, compiled(function))
     finally:
         settings.CACHE_DIR = before
