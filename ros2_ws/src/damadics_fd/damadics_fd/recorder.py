@@ -1,179 +1,28 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The recorder node: topics, raw, into a crash-safe MCAP bag."""
+"""Node `recorder`: topics, raw, into a crash-safe MCAP bag."""
 
 import argparse
-import importlib
-import shutil
 import signal
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
 
 import rclpy
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from rclpy.event_handler import SubscriptionEventCallbacks
-from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.experimental import EventsExecutor
 from rclpy.signals import SignalHandlerOptions
-from rclpy.subscription import Subscription
 from rclpy.task import Future
 from rclpy.utilities import remove_ros_args
 
-from damadics_fd.bag import BagError, BagWriter
-from damadics_fd.bag.rosbag2 import QosProfile, Topic, qos
+from damadics_fd.bag.blackbox import BlackBox
+from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.spool import Spool
+from damadics_fd.bag.writer import BagWriter
+from damadics_fd.ros.recording import Recorder
 
-DEPTH = 100_000  # messages that may wait in the middleware while this process is held up
-LOOK_PERIOD = 0.1  # [s] between two looks at the graph
-QUIET = 0.03  # [s] without a message after which nothing is on its way any more
-LAST_WAIT = 0.15  # [s] at most, from the signal to the closing of the bag
-OWN_TOPICS = {  # subscribed before they have a publisher, so that nothing of them is missed
-    'measurement': ('damadics_msgs/msg/Measurement', False),
-    'fault_state': ('damadics_msgs/msg/FaultState', False),
-    'estimate': ('damadics_msgs/msg/Estimate', False),
-    'residual': ('damadics_msgs/msg/Float64Stamped', False),
-    'threshold': ('damadics_msgs/msg/Float64Stamped', False),
-    'fault_flag': ('damadics_msgs/msg/FaultFlag', True),
-    'fault_event': ('damadics_msgs/msg/FaultEvent', True),
-}
-
-
-class Recorded(NamedTuple):
-    """A topic with the subscription that feeds it and what this asks of the publishers."""
-
-    topic: Topic
-    subscription: Subscription
-    reliable: bool
-    latched: bool
-
-
-def describe(profile: QoSProfile) -> QosProfile:
-    """Describe the quality of service of a publisher as rosbag2 writes it."""
-    spans = {}
-    for name in ('deadline', 'lifespan', 'liveliness_lease_duration'):
-        nanoseconds = getattr(profile, name).nanoseconds
-        spans[name] = {'sec': nanoseconds // 10**9, 'nsec': nanoseconds % 10**9}
-    return qos(
-        profile.reliability.name.lower(), profile.durability.name.lower(),
-        profile.history.name.lower(), profile.depth, liveliness=profile.liveliness.name.lower(),
-        **spans,
-    )
-
-
-class Recorder(Node):
-    """
-    Record topics as they appear.
-
-    :param bag: bag to write.
-    :param topics: names of the topics to record, empty for all.
-    :param rotate: remove the oldest file of the bag when the disk is full.
-    """
-
-    def __init__(self, bag: BagWriter, topics: list[str], rotate: bool = False):
-        super().__init__('recorder')
-        self.spool = Spool(bag, rotate)
-        self._wanted = {self.resolve_topic_name(name) for name in topics}
-        self._recorded: dict[str, Recorded] = {}
-        self._refused: set[str] = set()
-        self._lost: dict[str, int] = {}
-        self._now: Callable[[], int] = time.time_ns
-        if self.get_parameter('use_sim_time').value:
-            self._now = lambda: self.get_clock().now().nanoseconds
-        own = {self.resolve_topic_name(name): known for name, known in OWN_TOPICS.items()}
-        for name, (kind, latched) in own.items():
-            if not self._wanted or name in self._wanted:
-                self._record(name, kind, True, latched)
-        self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
-        self.look()
-        self.create_timer(LOOK_PERIOD, self.look)
-        self.create_timer(1.0, self.report)
-
-    @property
-    def topics(self) -> list[str]:
-        """Names of the topics that are recorded."""
-        return sorted(self._recorded)
-
-    def look(self) -> None:
-        """Subscribe to topics that have appeared, as their publishers offer them."""
-        for name, kinds in self.get_topic_names_and_types():
-            if name in self._refused or (self._wanted and name not in self._wanted):
-                continue
-            offers = [info.qos_profile for info in self.get_publishers_info_by_topic(name)]
-            if not offers:
-                continue
-            reliable = all(o.reliability == ReliabilityPolicy.RELIABLE for o in offers)
-            latched = all(o.durability == DurabilityPolicy.TRANSIENT_LOCAL for o in offers)
-            known = self._recorded.get(name)
-            if known and ((known.reliable and not reliable) or (known.latched and not latched)):
-                self.destroy_subscription(known.subscription)  # asks for more than is offered
-                known = None
-            if not known:
-                self._record(name, kinds[0], reliable, latched)
-            if name in self._recorded:
-                self._recorded[name].topic.offered_qos = [describe(offer) for offer in offers]
-
-    def _record(self, name: str, kind: str, reliable: bool, latched: bool) -> None:
-        package, folder, short = kind.split('/')
-        try:
-            message_type = getattr(importlib.import_module(f'{package}.{folder}'), short)
-            topic = self.spool.bag.add_topic(name, kind)
-        except (ImportError, AttributeError, BagError) as error:
-            self._refused.add(name)
-            self.get_logger().error(f'cannot record {name} of type {kind}: {error}')
-            return
-        put, now = self.spool.put, self._now
-
-        def receive(data: bytes) -> None:
-            put((topic, data, now()))
-
-        def receive_first(data: bytes) -> None:
-            self.look()  # the channel is written with the first message: who publishes it?
-            subscription.callback = receive
-            receive(data)
-
-        profile = QoSProfile(
-            depth=DEPTH,
-            reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
-            durability=(
-                DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE
-            ),
-        )
-        events = SubscriptionEventCallbacks(
-            message_lost=lambda event: self._lost.__setitem__(name, event.total_count)
-        )
-        subscription = self.create_subscription(
-            message_type, name, receive_first, profile, raw=True, event_callbacks=events
-        )
-        self._recorded[name] = Recorded(topic, subscription, reliable, latched)
-
-    def report(self) -> None:
-        """Publish what is recorded, lost and waiting."""
-        spool, bag = self.spool, self.spool.bag
-        lost = sum(self._lost.values())
-        status = DiagnosticStatus(name='recorder: bag', hardware_id=str(bag.path))
-        if spool.error or spool.dropped:
-            status.level = DiagnosticStatus.ERROR
-            status.message = f'cannot write: {spool.error}' if spool.error else 'messages dropped'
-        elif lost or self._refused:
-            status.level = DiagnosticStatus.WARN
-            status.message = 'messages lost' if lost else 'topics refused'
-        else:
-            status.level = DiagnosticStatus.OK
-            status.message = 'recording'
-        free = shutil.disk_usage(bag.path.parent).free
-        values = {
-            'Size (B)': bag.size, 'Messages waiting': spool.waiting, 'Messages lost': lost,
-            'Messages dropped': spool.dropped, 'Free disk (B)': free,
-            'Topics refused': ' '.join(sorted(self._refused)),
-            **{f'Messages on {name}': count for name, count in bag.counts.items()},
-        }
-        status.values = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
-        message = DiagnosticArray(status=[status])
-        message.header.stamp = self.get_clock().now().to_msg()
-        self._diagnostics.publish(message)
+SLICE = 0.02  # [s] between two looks at the signals
+QUIET = 0.02  # [s] without a message after which nothing is on its way any more
+LAST_WAIT = 0.12  # [s] at most, from the signal to the closing of the bag
 
 
 def _arguments(args: list[str]) -> argparse.Namespace:
@@ -193,9 +42,19 @@ def _arguments(args: list[str]) -> argparse.Namespace:
         '--quota-mb', type=float, default=0,
         help='keep the bag below so many MB by removing its oldest files',
     )
+    parser.add_argument(
+        '--black-box', nargs=2, type=float, metavar=('BEFORE', 'AFTER'),
+        help='hold the last BEFORE seconds in memory; write a bag when a fault is flagged, until'
+        ' AFTER seconds later',
+    )
     options = parser.parse_args(args)
     if options.all and options.topics:
         parser.error('give topics or --all, not both')
+    splitting = (options.split_mb, options.split_s, options.quota_mb)
+    if min(splitting) < 0 or min(options.black_box or [0]) < 0:
+        parser.error('sizes and times must not be negative')
+    if options.black_box and any(splitting):
+        parser.error('--black-box writes one bag per fault: no split, no quota')
     options.out = options.out or Path(time.strftime('rosbag2_%Y_%m_%d-%H_%M_%S'))
     return options
 
@@ -204,43 +63,49 @@ def main(args: list[str] | None = None) -> int:
     """Run the node."""
     arguments = sys.argv if args is None else ['recorder', *args]
     options = _arguments(remove_ros_args(arguments)[1:])
-    stop = []
-    rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+    stop: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda signum, frame: stop.append(signum))
+    rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
     try:
-        bag = BagWriter(
-            options.out, split_bytes=int(options.split_mb * 1e6), split_seconds=options.split_s,
-            quota_bytes=int(options.quota_mb * 1e6),
-        )
-        node = Recorder(bag, options.topics, rotate=options.quota_mb > 0)
+        bag = _bag(options)
+        spool = Spool(bag, rotate=options.quota_mb > 0)
+        node = Recorder(spool, options.topics)
         print(f'recording {" ".join(node.topics)} into {bag.path}', flush=True)
-        _spin(node, stop)
-        node.spool.close()
+        _spin(node, spool, stop)
+        spool.close()
     except (BagError, OSError) as error:
         print(f'recorder: {error}', file=sys.stderr)
         return 1
     finally:
         rclpy.try_shutdown()
-    print(f'recorded {sum(bag.counts.values())} messages, {bag.size} bytes: {bag.path}')
-    return 0
+    lost = f', {spool.dropped} dropped' if spool.dropped else ''
+    print(f'recorded {sum(bag.counts.values())} messages{lost}, {bag.size} bytes: {bag.path}')
+    return int(bool(spool.dropped))
 
 
-def _spin(node: Recorder, stop: list[int]) -> None:
+def _bag(options: argparse.Namespace) -> BagWriter | BlackBox:
+    if options.black_box:
+        return BlackBox(options.out, *options.black_box)
+    return BagWriter(
+        options.out, split_bytes=int(options.split_mb * 1e6), split_seconds=options.split_s,
+        quota_bytes=int(options.quota_mb * 1e6),
+    )
+
+
+def _spin(node: Recorder, spool: Spool, stop: list[int]) -> None:
     """Receive until a signal comes, then what is still on its way."""
-    from rclpy.experimental import EventsExecutor
-
     executor = EventsExecutor()
     executor.add_node(node)
     never: Future = Future()
     while not stop:
-        # many callbacks per call, where spin_once() returns after each; timed, because untimed
-        # waiting is broken in the wheels
-        executor.spin_until_future_complete(never, 0.05)
+        # takes many messages per call, where spin_once() returns after each; timed, because
+        # untimed waiting is broken in the wheels
+        executor.spin_until_future_complete(never, SLICE)
     end = time.monotonic() + LAST_WAIT
     received = -1
-    while received != node.spool.received and time.monotonic() < end:
-        received = node.spool.received
+    while received != spool.received and time.monotonic() < end:
+        received = spool.received
         executor.spin_until_future_complete(never, QUIET)
 
 

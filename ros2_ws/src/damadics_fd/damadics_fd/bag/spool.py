@@ -6,6 +6,8 @@ import threading
 import time
 from collections import deque
 
+from damadics_fd.bag.blackbox import BlackBox
+from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.rosbag2 import Topic
 from damadics_fd.bag.writer import BagWriter
 
@@ -28,10 +30,13 @@ class Spool:
     :param most_waiting: bound on the queue, in messages.
     """
 
-    def __init__(self, bag: BagWriter, rotate: bool = False, most_waiting: int = 1_000_000):
+    def __init__(
+        self, bag: BagWriter | BlackBox, rotate: bool = False, most_waiting: int = 1_000_000
+    ):
         self.bag = bag
         self.dropped = 0
         self.error = ''  # why nothing can be written at present
+        self.taken = 0  # messages handed to the bag
         self._rotate = rotate
         self._most_waiting = most_waiting
         self._queue: deque[Item] = deque()
@@ -47,8 +52,8 @@ class Spool:
 
     @property
     def received(self) -> int:
-        """Messages written, waiting or dropped."""
-        return sum(self.bag.counts.values()) + len(self._queue) + self.dropped
+        """Messages taken, waiting or dropped."""
+        return self.taken + len(self._queue) + self.dropped
 
     def _run(self) -> None:
         retry_at = 0.0
@@ -67,10 +72,12 @@ class Spool:
                 self.error = ''
             for _ in range(len(self._queue)):
                 topic, data, log_time = self._queue.popleft()
+                self.taken += 1
                 self.bag.write(topic, data, log_time, log_time)
             self.bag.flush_if_due()
-        except OSError as error:
-            self.error = f'{error.strerror} ({self.bag.path})'
+        except (OSError, BagError) as error:
+            reason = error.strerror if isinstance(error, OSError) else error.reason
+            self.error = f'{reason} ({self.bag.path})'
             return self._rotate and self.bag.drop_oldest()
         return True
 
