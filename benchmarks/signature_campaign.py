@@ -28,7 +28,8 @@ from damadics_fd.core.pipeline import Result, run
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.signature_types import CAUSES
 from damadics_plant import Actuator, Fault, LuGreActuator, Scenario, simulate
-from damadics_plant.disturbance import Disturbance
+from damadics_plant.disturbance import CHAMBER_NOISE, HUM, WHITE
+from damadics_plant.parameters import RANGES
 from damadics_plant.sources import RandomSteps, Sine, Steps
 from tqdm import tqdm
 
@@ -66,10 +67,20 @@ def plant_run(seed: int, duration: float, model: str = 'lugre', faults: Iterable
                         p1=Sine(3.5e6, 175e3, 0.1, phase[0]),
                         p2=Sine(2.6e6, 26e3, 1 / np.pi, phase[1]))
     columns = dict(simulate(scenario, RATE, actuator, noise='cv', seed=seed))
-    noise = Disturbance(seed + 1)
-    for name in sorted(NOISE):
-        columns[name] = noise.disturb(name, columns[name], 0, 1, RATE)
+    disturb(columns, np.random.default_rng(seed + 1))
     return columns
+
+
+def disturb(columns: Columns, rng: np.random.Generator) -> None:
+    """Add the benchmark's noise to the signals that the force is computed from."""
+    t = columns['stamp'] * 1e-9
+    for name in sorted(NOISE):
+        white = rng.standard_normal(len(t))
+        if name == 'ps':
+            columns[name] = columns[name] + CHAMBER_NOISE * white
+        else:
+            hum = HUM * np.sin(2 * np.pi * 50.0 * t + 0.3)
+            columns[name] = columns[name] + RANGES[name] * (hum + WHITE * white)
 
 
 def stiffened(model: str, change: float, start: float, development: float = 0.0,
@@ -261,14 +272,12 @@ def day(hours: int) -> dict[str, Any]:
                         p1=Sine(3.5e6, 175e3, 0.1), p2=Sine(2.6e6, 26e3, 1 / np.pi))
     plant = Simulator(scenario, RATE, LuGreActuator(stiffness=60892 * 1.03, coulomb=28.0),
                       noise='cv', seed=77)
-    noise = Disturbance(78)
+    rng = np.random.default_rng(78)
     estimator, detector = Estimator(SETTINGS), Detector(SETTINGS)
-    alarms, done, high = 0, 0, np.zeros(3)
+    alarms, high = 0, np.zeros(3)
     for _ in tqdm(range(hours), desc='day'):
         columns = plant.advance(int(3600 * RATE))
-        for name in sorted(NOISE):
-            columns[name] = noise.disturb(name, columns[name], done, 1, RATE)
-        done += len(columns['stamp'])
+        disturb(columns, rng)
         result = run(columns, SETTINGS, estimator, detector)
         alarms += len(result.detections)
         high = np.maximum(high, detector.signature.state[0].d_max[:3])

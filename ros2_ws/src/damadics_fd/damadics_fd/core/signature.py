@@ -32,6 +32,7 @@ from damadics_fd.core.signature_reference import (
     widen_reference,
 )
 from damadics_fd.core.signature_types import (
+    CAUSE_ELASTIC,
     CAUSE_FRICTION_DOWN,
     CAUSE_FRICTION_UP,
     CAUSE_SPRING_SOFTER,
@@ -320,6 +321,7 @@ class SignatureView:
     value: float
     std: float
     confidence: float
+    second: str  # the likeliest cause while `cause` is 'elastic'
 
 
 class Signature:
@@ -409,5 +411,6 @@ class Signature:
         s = self.state[0]
         value, std, confidence = known(s.cause_value, s.cause_std, s.confidence)
         return SignatureView(
-            int(s.state), int(s.family), CAUSES[int(s.cause)], value, std, confidence
+            int(s.state), int(s.family), CAUSES[int(s.cause)], value, std, confidence,
+            CAUSES[int(s.second)] if s.cause == CAUSE_ELASTIC else 'none',
         )

@@ -16,7 +16,7 @@ from damadics_fd.core.signature_types import FILL, STROKES, VENT
 
 P_ATM = 101325.0  # [Pa]
 P_FLOOR = 5e3  # [Pa] less driving pressure than this says nothing
-MIN_STROKE = 0.02  # [1] of the supply pressure: a smaller one does not reach its top rate
+MIN_STROKE = 0.15  # [1] a shorter stroke may not reach its top rate; holding against P1 does not
 
 
 @jit
@@ -43,14 +43,14 @@ def track_air(s: Any, c: Any, learn: bool) -> bool:
     y = abs(rate) / math.sqrt(drive)
     ended = False
     if way != s.air_way:
-        ended = end_stroke(s, c, learn)
+        ended = end_stroke(s, learn)
         s.air_way = way
         s.air_n = 0
         s.air_moved = 0.0
         s.air_top = 0.0
         s.air_second = 0.0
     s.air_n += 1
-    s.air_moved += 0.5 * (ps2 - ps0)
+    s.air_moved += 0.5 * (s.bx[2] - s.bx[0])
     if y > s.air_top:
         s.air_second = s.air_top
         s.air_top = y
@@ -61,17 +61,16 @@ def track_air(s: Any, c: Any, learn: bool) -> bool:
 
 
 @jit
-def end_stroke(s: Any, c: Any, learn: bool) -> bool:
+def end_stroke(s: Any, learn: bool) -> bool:
     """
     Take the second best rate of a stroke into the reference or the latest strokes.
 
     :param s: state record.
-    :param c: settings record.
     :param learn: True while what is seen may become the reference.
     :return: True if the present rates are new.
     """
     way = s.air_way
-    if abs(s.air_moved) < MIN_STROKE * c.supply_pressure or s.air_n < 2:
+    if abs(s.air_moved) < MIN_STROKE:
         return False
     if s.air_learned[way] < STROKES:
         if learn:

@@ -287,8 +287,22 @@ def name_elastic(s: Any, c: Any, m: int, p: float) -> None:
     for h in range(SPRING, N_HYP):
         if s.logp[m][h] > s.logp[m][best]:
             best = h
-    s.second = best
     s.cause_value, s.cause_std = physical_value(s, c, m, best)
+    s.second = cause_of(best, s.cause_value)
+
+
+@jit
+def cause_of(h: int, value: float) -> int:
+    """
+    Name a hypothesis of the elastic family.
+
+    :param h: SPRING to POSITION_OFFSET.
+    :param value: its change.
+    :return: a CAUSE constant.
+    """
+    if h == SPRING:
+        return CAUSE_SPRING_STIFFER if value >= 0.0 else CAUSE_SPRING_SOFTER
+    return CAUSE_PRELOAD + h - PRELOAD
 
 
 @jit
@@ -321,12 +335,7 @@ def second_stage(s: Any, c: Any) -> None:
         if s.logp[m][h] > s.logp[m][best]:
             best = h
     p = math.exp(s.logp[m][best]) / max(total, 1e-300)
-    s.second = best
     s.cause_value, s.cause_std = physical_value(s, c, m, best)
+    s.second = cause_of(best, s.cause_value)
     s.confidence = p
-    if p <= c.p_firm:
-        s.cause = CAUSE_ELASTIC
-    elif best == SPRING:
-        s.cause = CAUSE_SPRING_STIFFER if s.cause_value >= 0.0 else CAUSE_SPRING_SOFTER
-    else:
-        s.cause = CAUSE_PRELOAD + best - PRELOAD
+    s.cause = s.second if p > c.p_firm else CAUSE_ELASTIC

@@ -55,7 +55,7 @@ CAUSES = (
 ) = range(len(CAUSES))
 
 FILL, VENT = 0, 1  # ways of the chamber's air
-STROKES = 8  # strokes each way that show the top rate
+STROKES = 5  # strokes each way that show the top rate
 
 MIN_RATE = 40.0  # [Hz] fewer samples make no block mean
 N_PLUG = 16  # capacity of the plug force table
