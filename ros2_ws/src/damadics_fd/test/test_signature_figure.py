@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 import numpy as np
 import pytest
-
 from damadics_fd.core.signature import Signature
 from damadics_fd.core.signature_types import SignatureSettings
 from damadics_fd.signature_figure import ForceMap, force_over_position
