@@ -9,13 +9,16 @@ BUILT := ros2_ws/install/.built
 SOURCES := $(shell find ros2_ws/src -type f -not -name '*.pyc' -not -path '*/__pycache__/*' \
 	-not -path '*/test/*' -not -path '*/.pytest_cache/*')
 
-.PHONY: help demo test report build env lint clean
+.PHONY: help demo dashboard test report build env lint clean
 
 help: ## show what can be made
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 18
 
 demo: $(BUILT) ## the paper's two experiments through the running nodes: table, figures, bags
 	@$(ENV) && ros2 run damadics_bringup demo --out bags/demo $(ARGS)
+
+dashboard: $(BUILT) ## a simulated valve and the web page at http://127.0.0.1:8080
+	@$(ENV) && ros2 run damadics_bringup run --simulate --dashboard $(ARGS)
 
 test: $(BUILT) ## run all tests
 	@$(ENV) && python -m pytest -m 'not slow' $(ARGS)

@@ -8,92 +8,18 @@ import time
 
 import numpy as np
 import pytest
-import rclpy
 from damadics_bringup.processes import (
-    Processes,
     executable,
-    free_domain,
     parameters,
-    surroundings,
 )
 from damadics_fd.core.pipeline import run
 from damadics_fd.core.settings import Settings
 from damadics_fd.ros import qos
-from damadics_msgs.msg import Estimate, FaultFlag, Float64Stamped, Measurement
+from damadics_msgs.msg import Estimate, FaultFlag, Float64Stamped
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.context import Context
-from rclpy.experimental import EventsExecutor
-from rclpy.qos import QoSProfile
 
 pytestmark = pytest.mark.ros
 PERIOD = 2_500_000  # ns
-
-
-class Peer:
-    """A node of the test in its own domain: publishes samples, keeps what the nodes publish."""
-
-    def __init__(self, domain: int) -> None:
-        self.context = Context()
-        rclpy.init(context=self.context, domain_id=domain)
-        self.node = rclpy.create_node('peer', context=self.context)
-        self.executor = EventsExecutor(context=self.context)
-        self.executor.add_node(self.node)
-        self.publisher = self.node.create_publisher(Measurement, 'measurement', qos.samples())
-        self.got: dict[str, list] = {}
-
-    def listen(self, kind, topic: str, profile: QoSProfile) -> list:
-        messages = self.got[topic] = []
-        self.node.create_subscription(kind, topic, messages.append, profile)
-        return messages
-
-    def wait(self, condition, patience: float = 10.0) -> bool:
-        deadline = time.monotonic() + patience
-        while not condition() and time.monotonic() < deadline:
-            self.executor.spin_once(timeout_sec=0.02)
-        return bool(condition())
-
-    def send(self, stamp: int, cv: float, x1: float, **others: float) -> None:
-        message = Measurement(cv=cv, x1=x1, p1=3.5e6, p2=2.6e6, t1=20.0, flow=5.0, ps=1e5)
-        for name, value in others.items():
-            setattr(message, name, value)
-        message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 1_000_000_000)
-        message.header.frame_id = 'LC74_20'
-        self.publisher.publish(message)
-
-    def send_columns(self, columns: dict[str, np.ndarray]) -> None:
-        """Send samples no faster than the chain takes them: a queue holds 1000."""
-        for n, values in enumerate(
-            zip(*(columns[k].tolist() for k in ('stamp', 'cv', 'x1')), strict=True), 1
-        ):
-            self.send(*values)
-            if n % 300 == 0:
-                assert self.wait(lambda n=n: len(self.got['threshold']) >= n), 'samples were lost'
-
-    def close(self) -> None:
-        self.executor.shutdown()
-        self.node.destroy_node()
-        self.context.try_shutdown()
-
-
-@pytest.fixture
-def domain(monkeypatch):
-    number = free_domain()
-    for name, value in surroundings(number).items():
-        monkeypatch.setenv(name, value)
-    return number
-
-
-@pytest.fixture
-def peer(domain):
-    peer = Peer(domain)
-    yield peer
-    peer.close()
-
-
-@pytest.fixture
-def processes(tmp_path, domain):
-    with Processes(tmp_path / 'logs', surroundings(domain)) as processes:
-        yield processes
 
 
 @pytest.fixture

@@ -96,7 +96,9 @@ def requirement_files(ros_installed: bool) -> list[Path]:
     :param ros_installed: an installed ROS 2 is used.
     :return: paths of requirement files.
     """
-    names = ['project', 'test'] if ros_installed else ['ros', 'project', 'test']
+    names = ['project', 'dashboard', 'test']
+    if not ros_installed:
+        names.insert(0, 'ros')
     return [REQUIREMENTS / f'{name}.txt' for name in names]
 
 

@@ -15,6 +15,7 @@ setup(
         ('share/' + package, ['package.xml']),
         ('share/' + package + '/launch', glob('launch/*.py')),
         ('share/' + package + '/config', glob('config/*.yaml')),
+        ('share/' + package + '/layouts', glob('layouts/*')),
     ],
     install_requires=['setuptools'],
     zip_safe=False,
@@ -23,5 +24,8 @@ setup(
     description='Launch files, parameter files, layouts and the demonstration of DAMADICS FD.',
     license='Apache-2.0',
     extras_require={'test': ['pytest']},
-    entry_points={'console_scripts': ['demo = damadics_bringup.demo:main']},
+    entry_points={'console_scripts': [
+        'demo = damadics_bringup.demo:main',
+        'run = damadics_bringup.launcher:main',
+    ]},
 )

@@ -8,6 +8,7 @@ setup(
     name=package,
     version='0.1.0',
     packages=find_packages(exclude=['test']),
+    package_data={package: ['static/*']},
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/' + package]),
         ('share/' + package, ['package.xml']),
@@ -19,5 +20,5 @@ setup(
     description='A web page for the people at the plant.',
     license='Apache-2.0',
     extras_require={'test': ['pytest']},
-    entry_points={'console_scripts': []},
+    entry_points={'console_scripts': ['dashboard = damadics_dashboard.dashboard:main']},
 )

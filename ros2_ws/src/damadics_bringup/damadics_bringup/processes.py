@@ -120,16 +120,20 @@ class Processes:
                 process.kill()
                 process.wait()
 
-    def start(self, package: str, name: str, arguments: Sequence[str] = ()) -> None:
+    def start(self, package: str, name: str, arguments: Sequence[str] = (),
+              label: str = '') -> None:
         """
         Start an executable.
 
         :param package: name of its ROS package.
-        :param name: its name, by which it is known here.
+        :param name: its name.
         :param arguments: its command line.
+        :param label: what it is known by here, where one executable runs more than once.
         """
-        with self.log(name).open('wb') as log:
-            self._running[name] = subprocess.Popen(
+        label = label or name
+        self.log(label).parent.mkdir(parents=True, exist_ok=True)
+        with self.log(label).open('ab') as log:
+            self._running[label] = subprocess.Popen(
                 [executable(package, name), *arguments],
                 stdout=log, stderr=subprocess.STDOUT, env=self._environment,
             )
@@ -141,6 +145,15 @@ class Processes:
     def ended(self, name: str) -> bool:
         """Tell whether a process has ended."""
         return self._running[name].poll() is not None
+
+    def exit_code(self, name: str) -> int | None:
+        """Return the exit code of a process, None while it runs."""
+        return self._running[name].poll()
+
+    def kill(self, name: str) -> None:
+        """End a process at once, as a crash would."""
+        self._running[name].kill()
+        self._running[name].wait()
 
     def check(self) -> None:
         """

@@ -1,38 +1,45 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Start estimator, detector and recorder for one valve, and the simulated plant if asked."""
+"""Start estimator and detector for one valve; recorder, plant and web page if asked."""
 
+from pathlib import Path
+
+from ament_index_python.packages import get_package_share_directory
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
 from launch.conditions import IfCondition
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
+CONFIG = Path(get_package_share_directory('damadics_bringup'), 'config')
+
 
 def generate_launch_description():
     """Describe what is started."""
-    arguments = [
-        DeclareLaunchArgument('mode', default_value='paper', description='mode of the detection'),
+    namespace = LaunchConfiguration('namespace')
+    parameters = [LaunchConfiguration('parameters')]
+    return LaunchDescription([
+        DeclareLaunchArgument('parameters', default_value=str(CONFIG / 'valve.param.yaml'),
+                              description='parameter file of the valve'),
         DeclareLaunchArgument('namespace', default_value='', description='namespace of the valve'),
-        DeclareLaunchArgument('simulate', default_value='true', description='start the plant'),
-        DeclareLaunchArgument('scenario', default_value='paper_friction',
+        DeclareLaunchArgument('simulate', default_value='false', description='start the plant'),
+        DeclareLaunchArgument('scenario', default_value='nominal',
                               description='scenario of the plant; simulate --list shows all'),
+        DeclareLaunchArgument('dashboard', default_value='false', description='start the page'),
         DeclareLaunchArgument('record', default_value='false', description='record all topics'),
         DeclareLaunchArgument('bag', default_value='valve_bag', description='folder of the bag'),
-    ]
-    namespace = LaunchConfiguration('namespace')
-    mode = {'mode': LaunchConfiguration('mode')}
-    return LaunchDescription([
-        *arguments,
         Node(package='damadics_fd', executable='estimator', namespace=namespace,
-             parameters=[mode], output='screen'),
+             parameters=parameters, respawn=True, respawn_delay=1.0, output='screen'),
         Node(package='damadics_fd', executable='detector', namespace=namespace,
-             parameters=[mode], output='screen'),
+             parameters=parameters, respawn=True, respawn_delay=1.0, output='screen'),
         Node(package='damadics_fd', executable='recorder',
              arguments=['--all', '--out', LaunchConfiguration('bag')], output='screen',
              condition=IfCondition(LaunchConfiguration('record'))),
         Node(package='damadics_plant', executable='plant', namespace=namespace,
-             parameters=[{'scenario': LaunchConfiguration('scenario'),
+             parameters=[{'scenario': LaunchConfiguration('scenario'), 'model': 'lugre',
+                          'rate': 200.0, 'noise': True, 'duration': 1e8,
                           'wait_for_subscribers': 1}],
              output='screen', condition=IfCondition(LaunchConfiguration('simulate'))),
+        Node(package='damadics_dashboard', executable='dashboard', output='screen',
+             condition=IfCondition(LaunchConfiguration('dashboard'))),
     ])

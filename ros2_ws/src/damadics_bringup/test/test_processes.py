@@ -4,8 +4,8 @@ import socket
 
 import pytest
 from damadics_bringup.processes import (
-    Processes,
     ProcessError,
+    Processes,
     executable,
     free_domain,
     parameters,

@@ -3,107 +3,174 @@
 """Node `detector`: residual against threshold, fault flag and events of one actuator."""
 
 import sys
+from pathlib import Path
+from typing import Any
 
 from damadics_msgs.msg import Estimate as EstimateMessage
 from damadics_msgs.msg import FaultEvent, FaultFlag, Float64Stamped
 from rclpy.clock import Clock, ClockType
-from rclpy.node import Node
+from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 
 from damadics_fd.core.alarm import NE107
-from damadics_fd.core.detector import Decision, Detector
+from damadics_fd.core.detector import Decision, Detector, Outcome
 from damadics_fd.core.estimator import Estimate
 from damadics_fd.ros import qos
+from damadics_fd.ros.alarm_store import AlarmStore, another_run, default_folder
 from damadics_fd.ros.conversions import event_message, read_estimate, write_flag
-from damadics_fd.ros.diagnostics import Diagnostics, Level, Report
-from damadics_fd.ros.parameters import Parameters, declare_settings
+from damadics_fd.ros.diagnostics import Level, Report
+from damadics_fd.ros.managed import MonitoringNode
+from damadics_fd.ros.operator import OperatorServices
+from damadics_fd.ros.rival import RivalWatch
 from damadics_fd.ros.spin import spin
-from damadics_fd.ros.waiting import InputWatch
 
 HEARTBEAT = 1.0  # s of wall time
 START_ESTIMATOR = 'start the estimator: ros2 run damadics_fd estimator'
 READY = Estimate._make([1] + [0.0] * 14 + [0])  # an estimate that makes the core compile
 
 
-class DetectorNode(Node):
-    """Judge each estimate; publish residual, threshold and what changes."""
+class DetectorNode(MonitoringNode):
+    """Judge each estimate; publish residual, threshold and what changes; serve operators."""
 
     def __init__(self) -> None:
-        super().__init__('detector')
-        self.finished = False
-        parameters = Parameters(self)
-        actuator = parameters.declare('actuator', '', 'tag of the actuator, for diagnostics')
-        timeout = parameters.declare(
-            'input_timeout', 0.5, 'silence after which the valve is not monitored [s]',
-            limits=(0.01, 3600.0),
-        )
-        settings = declare_settings(parameters)
-        Detector(settings).update(READY)
-        self._core = Detector(settings)
+        super().__init__('detector', 'estimate', START_ESTIMATOR)
+        Detector(self.settings).update(READY)
+        self._core = Detector(self.settings)
         self._decision: Decision | None = None
+        self._loaded: int | None = None  # stamp of the alarm state that was loaded
+        self._twice = 0
         self._number = Float64Stamped()
         self._flag = FaultFlag()
-        samples = qos.samples(settings.sample_rate)
+        samples = qos.samples(self.settings.sample_rate)
         self._residual = self.create_publisher(Float64Stamped, 'residual', samples)
         self._threshold = self.create_publisher(Float64Stamped, 'threshold', samples)
         self._fault_flag = self.create_publisher(FaultFlag, 'fault_flag', qos.FLAG)
         self._fault_event = self.create_publisher(FaultEvent, 'fault_event', qos.EVENTS)
-        self._watch = InputWatch(self, 'estimate', START_ESTIMATOR, timeout)
-        self._diagnostics = Diagnostics(self, actuator or 'actuator', self._report)
+        self._rival = RivalWatch(self, self.refuse)
+        OperatorServices(self, self._core, self._operated)
         self._was_silent = True
+        self.start()
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(min(timeout / 5.0, HEARTBEAT), self._look, clock=steady)
+        self.create_timer(min(self.watch.timeout / 5.0, HEARTBEAT), self._look, clock=steady)
         self.create_timer(HEARTBEAT, self._publish_flag, clock=steady)
-        self.create_subscription(EstimateMessage, 'estimate', self._take, samples)
+        self.watch.subscribe(EstimateMessage, self._take, samples)
         self._publish_flag()
-        self.get_logger().info(f'mode {settings.mode}, {settings.sample_rate:g} Hz')
+        self.get_logger().info(f'mode {self.settings.mode}, {self.settings.sample_rate:g} Hz')
+
+    def declare_more(self) -> None:
+        """Declare where alarms are kept."""
+        self._folder = self.parameters.declare(
+            'alarm_folder', 'auto', 'folder that keeps the alarms over a restart; "auto": one of '
+            'the user, in mode paper none; "": none',
+        )
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Begin afresh, with the alarms from before where they are kept."""
+        self._core.reset()
+        self._store = self._make_store()
+        try:
+            saved = self._store.load() if self._store else None
+            if saved is not None:
+                self._core.load(saved)
+                self._decision = self._core.decision
+                self._loaded = int(saved['stamp'])
+                self.get_logger().info(f'alarms of before taken up from {self._store.path}')
+        except ValueError as problem:
+            self.get_logger().error(f'alarms of before are lost: {problem}')
+        return super().on_configure(state)
+
+    def _make_store(self) -> AlarmStore | None:
+        if not self._folder or (self._folder == 'auto' and self.settings.mode == 'paper'):
+            return None
+        folder = default_folder() if self._folder == 'auto' else Path(self._folder).expanduser()
+        name = self.get_namespace().strip('/').replace('/', '__') or 'root'
+        return AlarmStore(folder / f'{name}.alarm.json')
 
     def _take(self, message: EstimateMessage) -> None:
-        self._watch.arrived()
-        decision = self._core.update(read_estimate(message))
+        if not self.active:
+            return
+        estimate = read_estimate(message)
+        before = self._decision
+        if self._loaded is not None:
+            if another_run(self._loaded, estimate.stamp):
+                self.get_logger().info('time begins anew: the alarms belong to another run')
+                self._core.reset()
+            self._loaded = None
+        elif before is not None and estimate.stamp == before.stamp:
+            self._twice += 1  # two estimators send
+            return
+        decision = self._decision = self._core.update(estimate)
         header = message.header
         self._number.header = self._flag.header = header
         self._number.data = decision.residual
         self._residual.publish(self._number)
         self._number.data = decision.threshold
         self._threshold.publish(self._number)
-        before, self._decision = self._decision, decision
         if before is None or self._was_silent or decision[5:8] != before[5:8]:
             self._was_silent = False
             self._publish_flag()
-            self._diagnostics.check()
-        for event in decision.events:
-            self._fault_event.publish(event_message(event, header.frame_id))
+            self.diagnostics.check()
+        if decision.events:
+            self._tell(decision.events, header.frame_id)
+
+    def _tell(self, events: Any, frame_id: str, more: str = '') -> None:
+        """Publish transitions, and keep the alarm for a restart."""
+        for event in events:
+            message = event_message(event, frame_id)
+            message.text += more
+            self._fault_event.publish(message)
+        if self._store:
+            try:
+                self._store.save(self._core.save())
+            except OSError as problem:
+                self.get_logger().error(f'the alarm would not survive a restart: {problem}',
+                                        throttle_duration_sec=60.0)
 
     def _look(self) -> None:
         """Turn to "not monitoring" when the input falls silent."""
-        if self._watch.silent and not self._was_silent:
+        if not self._was_silent and (self.watch.silent or not self.active):
             self._was_silent = True
             self._publish_flag()
-            self._diagnostics.check()
+            self.diagnostics.check()
 
     def _publish_flag(self) -> None:
         if self._decision is not None:
             write_flag(self._decision, self._flag)
-        if self._watch.silent:
+        if self.watch.silent or not self.active:
             self._flag.state = FaultFlag.STATE_NOT_MONITORING
         self._fault_flag.publish(self._flag)
+        self._rival.sent()
 
-    def _report(self) -> Report:
+    def _operated(self, outcome: Outcome, remark: str) -> None:
+        self._decision = self._core.decision
+        self._publish_flag()
+        self._tell(outcome.events, self._flag.header.frame_id, remark)
+        self.diagnostics.publish()
+
+    def report(self) -> Report:
+        """Say what is judged."""
         decision = self._decision
         if decision is None:
-            return Level.ERROR, 'no estimate has arrived', {'Mode': self._core.settings.mode}
+            return Level.ERROR, 'no estimate has arrived', {}
+        statistics = self._core.statistics
         values = {
-            'Mode': self._core.settings.mode,
             'Fault': decision.fault,
             'Residual (1/s)': decision.residual,
             'Threshold (1/s)': decision.threshold,
             'Faults since the start': decision.occurrence,
+            'Acknowledged': decision.acknowledged,
+            'Near misses': statistics['near_misses'],
+            'Chatter': bool(statistics['chatter']),
+            'Estimates received twice': self._twice,
             'NE 107': NE107[decision.level],
         }
-        if self._watch.silent:
+        if self.watch.silent:
             return Level.ERROR, 'estimates have stopped: not monitoring', values
         if decision.fault:
             return Level.ERROR, f'fault {decision.occurrence} flagged', values
+        if self._twice:
+            return Level.WARN, 'estimates arrive twice: end one of the estimators', values
+        if decision.level:
+            return Level.WARN, f'{NE107[decision.level]}: no faults are reported', values
         return Level.OK, 'no fault flagged', values
 
 

@@ -4,12 +4,14 @@
 
 import sys
 import time
+from typing import Any
 
 import rclpy
 from damadics_fd.ros import qos
 from damadics_fd.ros.parameters import Parameters
 from damadics_fd.ros.spin import spin
 from damadics_msgs.msg import FaultState, Measurement
+from damadics_msgs.srv import InjectFault
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rosgraph_msgs.msg import Clock as ClockMessage
@@ -29,6 +31,7 @@ class Plant(Node):
     def __init__(self) -> None:
         super().__init__('plant')
         self.finished = False
+        self.exit_code = 0
         parameters = Parameters(self)
         declare = parameters.declare
         scenario = declare('scenario', 'nominal', 'name of a scenario, or path of its YAML file')
@@ -48,15 +51,21 @@ class Plant(Node):
             'number of subscribers on measurement before the first sample', limits=(0, 100),
         )
         self._frame_id = declare('actuator', 'LC74_20', 'tag of the actuator')
+        duration = declare(
+            'duration', 0.0, 'time that is simulated [s]; 0: that of the scenario',
+            limits=(0.0, 1e9),
+        )
         publish_clock = declare('publish_clock', False, 'publish /clock from scenario time')
         parameters.check()
         try:
-            self._simulator = Simulator(scenario, rate=rate, model=model, noise=noise, seed=seed)
+            self._simulator = Simulator(scenario, rate=rate, model=model, noise=noise, seed=seed,
+                                        duration=duration or None)
         except ValueError as problem:
             parameters.check(f'scenario: {problem}')
         profile = qos.samples(rate * max(self._factor, 1.0))
         self._measurement = self.create_publisher(Measurement, 'measurement', profile)
         self._fault_state = self.create_publisher(FaultState, 'fault_state', profile)
+        self.create_service(InjectFault, 'inject_fault', self._inject)
         self._clock_topic = None
         if publish_clock:
             self._clock_topic = self.create_publisher(ClockMessage, '/clock', 10)
@@ -94,6 +103,21 @@ class Plant(Node):
         if self._simulator.finished:
             self.get_logger().info(f'scenario ended after {self._sent} samples')
             self.finished = True
+
+    def _inject(self, request: Any, response: Any) -> Any:
+        """Begin a fault with the next sample, or clear all."""
+        try:
+            if request.fault == FaultState.NONE:
+                self._simulator.clear()
+                response.message = 'all faults cleared'
+            else:
+                self._simulator.inject(f'f{request.fault}', request.strength, request.development)
+                response.message = f'fault f{request.fault} injected'
+            response.success = True
+        except ValueError as problem:
+            response.message = f'not injected: {problem}'
+        self.get_logger().info(response.message)
+        return response
 
     def _publish(self, count: int) -> None:
         columns = self._simulator.advance(count)

@@ -14,7 +14,7 @@ from damadics_fd.core.modes import MODES
 from damadics_fd.core.settings import Settings, SettingsError
 from damadics_fd.ros.spin import StartError
 
-DEFAULT_MODE = 'paper'
+DEFAULT_MODE = 'monitor'
 OF_EVERY_NODE = ('use_sim_time', 'start_type_description_service', 'qos_overrides.')
 
 
@@ -38,20 +38,22 @@ class Parameters:
         *,
         limits: tuple[float, float] | None = None,
         allowed: Iterable[str] = (),
+        live: bool = False,
     ) -> Any:
         """
-        Declare one read-only parameter.
+        Declare one parameter.
 
         :param name: name of the parameter.
         :param default: value where none is given; its type is the parameter's type.
         :param description: one line for people, with the unit.
         :param limits: least and greatest value.
         :param allowed: the values of a text parameter.
+        :param live: it may be changed while the node runs; otherwise it is read-only.
         :return: the value; the default where the given one is refused.
         """
         self._names.append(name)
         allowed = tuple(allowed)
-        descriptor = ParameterDescriptor(description=description, read_only=True)
+        descriptor = ParameterDescriptor(description=description, read_only=not live)
         if allowed:
             descriptor.additional_constraints = 'one of: ' + ', '.join(allowed)
         if limits and isinstance(default, float):

@@ -9,12 +9,14 @@ from typing import Protocol
 import rclpy
 from rclpy.executors import ExternalShutdownException
 from rclpy.experimental import EventsExecutor
+from rclpy.task import Future
 
 
 class SpinnableNode(Protocol):
     """What `spin` needs of a node."""
 
     finished: bool
+    exit_code: int
 
     def destroy_node(self) -> None:
         """Release what the node holds."""
@@ -31,7 +33,7 @@ def spin(make_node: Callable[[], SpinnableNode], args: list[str] | None = None) 
     :param make_node: makes the node; may raise `StartError`.
     :param args: command line, `sys.argv` by default.
     :return: the exit code: 0 after SIGINT, SIGTERM or the end of the node's work, 1 where the
-        node did not start.
+        node did not start, or what the node gives.
     """
     rclpy.init(args=args)
     try:
@@ -48,13 +50,15 @@ def spin(make_node: Callable[[], SpinnableNode], args: list[str] | None = None) 
     executor = EventsExecutor()
     executor.add_node(node)
     try:
-        # Never untimed: an untimed spin of this executor does not return in some builds.
+        # Never untimed: an untimed spin of this executor does not return in some builds. Many
+        # callbacks a call, where spin_once returns after each.
+        never: Future = Future()
         while rclpy.ok() and not node.finished:
-            executor.spin_once(timeout_sec=0.1)
+            executor.spin_until_future_complete(never, 0.1)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     finally:
         node.destroy_node()
         executor.shutdown()
         rclpy.try_shutdown()
-    return 0
+    return node.exit_code

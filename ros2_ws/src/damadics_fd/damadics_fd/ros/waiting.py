@@ -1,51 +1,143 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Say what a node waits for while its input is missing."""
+"""Take an input and watch it: silence, a second publisher, refused QoS, lost messages."""
 
 import time
+from collections.abc import Callable
+from typing import Any
 
 from rclpy.clock import Clock, ClockType
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
+from rclpy.qos import QoSPolicyKind, QoSProfile
 
 FIRST_WORD = 0.8  # s of wall time after the start
 NEXT_WORDS = 30.0  # s
+PERIODS = 3.0  # slower samples than the timeout allows for may be late by so many periods
 
 
 class InputWatch:
     """
-    Watch whether an input arrives, on wall time.
+    Subscribe to an input and watch whether it arrives.
+
+    Age is counted on ROS time, so that a slow or fast replay is judged as it was live. Where ROS
+    time itself stands still, wall time counts: a stopped clock is silence too.
 
     :param node: the node that needs the input.
     :param topic: its topic, as the node names it.
     :param command: the command that starts its publisher.
-    :param timeout: age [s] from which the input counts as silent.
+    :param timeout: age [s] from which the input counts as silent; may be set later.
+    :param period: nominal time between two messages [s].
     """
 
-    def __init__(self, node: Node, topic: str, command: str, timeout: float) -> None:
+    def __init__(self, node: Node, topic: str, command: str, timeout: float,
+                 period: float = 0.0) -> None:
+        self.timeout = timeout
         self._node = node
         self._topic = topic
         self._command = command
-        self._timeout = timeout
-        self._last: float | None = None
+        self._slow = PERIODS * period
+        self._clock = node.get_clock()
+        self._simulated = node.get_parameter('use_sim_time').value
+        self._wall: float | None = None  # monotonic time of the last message [s]
+        self._ros = 0  # ROS time of the last message [ns]
+        self._ros_seen = 0
+        self._ros_moved = 0.0  # monotonic time of the last motion of ROS time [s]
+        self._lost = 0
+        self._mismatch = ''
         self._timer = node.create_timer(
             FIRST_WORD, self._remind, clock=Clock(clock_type=ClockType.STEADY_TIME)
         )
 
-    def arrived(self) -> None:
-        """Note that a message has arrived."""
-        self._last = time.monotonic()
+    def subscribe(self, kind: type, take: Callable[[Any], None], profile: QoSProfile) -> None:
+        """
+        Subscribe to the input.
+
+        :param kind: type of its messages.
+        :param take: called with each message.
+        :param profile: quality of service; no deadline, for a publisher that offers none would
+            then not be heard at all.
+        """
+        def arrived(message: Any) -> None:
+            self._wall = time.monotonic()
+            if self._simulated:
+                self._ros = self._clock.now().nanoseconds
+            take(message)
+
+        events = SubscriptionEventCallbacks(
+            incompatible_qos=self._incompatible, message_lost=self._count_lost
+        )
+        self._node.create_subscription(kind, self._topic, arrived, profile, event_callbacks=events)
+
+    @property
+    def age(self) -> float:
+        """Time since the last message [s], infinite before the first."""
+        if self._wall is None:
+            return float('inf')
+        now = time.monotonic()
+        if not self._simulated:
+            return now - self._wall
+        ros = self._clock.now().nanoseconds
+        if ros != self._ros_seen:
+            self._ros_seen, self._ros_moved = ros, now
+        stopped = now - max(self._ros_moved, self._wall)
+        return max(max(ros - self._ros, 0) * 1e-9, stopped)
 
     @property
     def silent(self) -> bool:
         """Whether nothing has arrived for longer than the timeout."""
-        return self._last is None or time.monotonic() - self._last > self._timeout
+        return self.age > max(self.timeout, self._slow)
+
+    @property
+    def publishers(self) -> int:
+        """Number of publishers of the input."""
+        return self._node.count_publishers(self._topic)
+
+    @property
+    def problem(self) -> str:
+        """What is wrong with the input beside silence, '' if nothing."""
+        if self._mismatch:
+            return self._mismatch
+        if self.publishers > 1:
+            return f'{self.publishers} publishers on {self._name}: only one may send'
+        return ''
+
+    def values(self) -> dict[str, object]:
+        """
+        Return what a diagnostic status should tell.
+
+        :return: values by name with unit.
+        """
+        age = self.age
+        return {
+            'Age of the last message (s)': age if age < float('inf') else 'never',
+            'Publishers': self.publishers,
+            'Messages lost': self._lost,
+        }
+
+    @property
+    def _name(self) -> str:
+        return self._node.resolve_topic_name(self._topic)
+
+    def _incompatible(self, event: Any) -> None:
+        policy = QoSPolicyKind(event.last_policy_kind).name.lower()
+        self._mismatch = (
+            f'a publisher of {self._name} offers an incompatible quality of service ({policy}): '
+            'it has to be reliable'
+        )
+        self._node.get_logger().error(self._mismatch)
+
+    def _count_lost(self, event: Any) -> None:
+        self._lost = event.total_count
+        self._node.get_logger().warning(
+            f'{self._lost} messages lost on {self._name}: this machine is too slow',
+            throttle_duration_sec=5.0,
+        )
 
     def _remind(self) -> None:
-        period = FIRST_WORD
         if self.silent:
-            period = NEXT_WORDS
-            topic = self._node.resolve_topic_name(self._topic)
-            since = 'waiting for' if self._last is None else 'nothing comes any more on'
-            self._node.get_logger().warning(f'{since} {topic}: {self._command}')
-        self._timer.timer_period_ns = int(period * 1e9)
-        self._timer.reset()
+            self._timer.timer_period_ns = int(NEXT_WORDS * 1e9)
+            since = 'waiting for' if self._wall is None else 'nothing comes any more on'
+            self._node.get_logger().warning(f'{since} {self._name}: {self._command}')
+        else:
+            self._timer.timer_period_ns = int(FIRST_WORD * 1e9)

@@ -1,0 +1,197 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Command `run`: what the launch files do, on a machine without ROS 2's launch."""
+
+import argparse
+import os
+import signal
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from ament_index_python.packages import get_package_share_directory
+
+from damadics_bringup.fleet import FleetError, Valve, read_fleet
+from damadics_bringup.processes import ProcessError, Processes
+
+EXAMPLES = """examples:
+  ros2 run damadics_bringup run --simulate --dashboard     one simulated valve and the web page
+  ros2 run damadics_bringup run fleet.yaml --dashboard     your valves
+  ros2 run damadics_bringup run fleet.yaml --record bags/today"""
+LOOK = 0.2  # s between two looks at the processes
+FIRST_PAUSE, LONGEST_PAUSE = 1.0, 30.0  # s before a node that has died is started again
+STABLE = 60.0  # s after which a node counts as running
+FOREVER = 1e8  # s of simulated time
+
+
+class Task(NamedTuple):
+    """One process that is kept running."""
+
+    label: str
+    package: str
+    executable: str
+    arguments: list[str]
+
+
+def arguments_of(parameters: dict[str, Any], *, namespace: str = '', file: Path | None = None,
+                 topics: dict[str, str] | None = None) -> list[str]:
+    """
+    Write a node's command line.
+
+    :param parameters: by name.
+    :param namespace: of the node, without leading slash.
+    :param file: parameter file, read before the parameters.
+    :param topics: new name by name.
+    :return: arguments.
+
+    >>> arguments_of({'noise': True}, namespace='lv101')
+    ['--ros-args', '-r', '__ns:=/lv101', '-p', 'noise:=true']
+    """
+    words = ['--ros-args']
+    if namespace:
+        words += ['-r', f'__ns:=/{namespace}']
+    for old, new in (topics or {}).items():
+        words += ['-r', f'{old}:={new}']
+    if file:
+        words += ['--params-file', str(file)]
+    for name, value in parameters.items():
+        text = str(value).lower() if isinstance(value, bool) else str(value)
+        words += ['-p', f'{name}:={text}']
+    return words
+
+
+def tasks_of(valves: list[Valve], options: argparse.Namespace) -> list[Task]:
+    """
+    List what has to run.
+
+    :param valves: the fleet.
+    :param options: the command line.
+    :return: tasks, the consumers of samples before the plants.
+    """
+    tasks = []
+    if options.record:
+        tasks.append(Task('recorder', 'damadics_fd', 'recorder',
+                          ['--all', '--out', str(options.record)]))
+    for valve in valves:
+        tasks += [
+            Task(f'{valve.name}/{node}', 'damadics_fd', node, arguments_of(
+                valve.settings_of(node), namespace=valve.name, file=valve.parameters,
+                topics=dict(valve.topics)))
+            for node in ('estimator', 'detector')
+        ]
+    if options.dashboard:
+        tasks.append(Task('dashboard', 'damadics_dashboard', 'dashboard',
+                          ['--port', str(options.port), '--host', options.host]
+                          + (['--show'] if options.show else [])))
+    if options.simulate:
+        tasks += [
+            Task(f'{valve.name}/plant', 'damadics_plant', 'plant', arguments_of(
+                {'duration': FOREVER, 'wait_for_subscribers': 1,
+                 'actuator': valve.settings.get('actuator', valve.name), **valve.simulate},
+                namespace=valve.name, topics=dict(valve.topics)))
+            for valve in valves
+        ]
+    return tasks
+
+
+class Keeper:
+    """
+    Starts tasks and starts them again when they die, after a pause that doubles.
+
+    :param processes: where they run.
+    :param tasks: what is kept running.
+    """
+
+    def __init__(self, processes: Processes, tasks: list[Task]) -> None:
+        self._processes = processes
+        self._tasks = {task.label: task for task in tasks}
+        self._started: dict[str, float] = {}
+        self._due: dict[str, float] = {}
+        self._pause = dict.fromkeys(self._tasks, FIRST_PAUSE)
+        for label in self._tasks:
+            self._start(label)
+
+    def look(self) -> None:
+        """Start again what has died."""
+        now = time.monotonic()
+        for label in self._tasks:
+            if label in self._due:
+                if now >= self._due[label]:
+                    del self._due[label]
+                    self._start(label)
+            elif (code := self._processes.exit_code(label)) is not None:
+                if now - self._started[label] > STABLE:
+                    self._pause[label] = FIRST_PAUSE
+                pause = self._pause[label]
+                self._pause[label] = min(2.0 * pause, LONGEST_PAUSE)
+                self._due[label] = now + pause
+                print(f'{label} ended with exit code {code}, again in {pause:g} s; its last words '
+                      f'are in {self._processes.log(label)}', file=sys.stderr, flush=True)
+
+    def _start(self, label: str) -> None:
+        task = self._tasks[label]
+        self._processes.start(task.package, task.executable, task.arguments, label)
+        self._started[label] = time.monotonic()
+
+
+def parser() -> argparse.ArgumentParser:
+    """
+    Describe the command line.
+
+    :return: its parser.
+    """
+    state = Path(os.environ.get('XDG_STATE_HOME') or Path.home() / '.local' / 'state')
+    p = argparse.ArgumentParser(
+        prog='run', epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter,
+        description='Start estimator and detector of every valve and keep them running.',
+    )
+    p.add_argument('fleet', nargs='?', type=Path,
+                   help='list of the valves (YAML); default: one valve for a first look')
+    p.add_argument('--simulate', action='store_true', help='start a simulated plant per valve')
+    p.add_argument('--dashboard', action='store_true', help='start the web page')
+    p.add_argument('--show', action='store_true', help='open the web page in a browser')
+    p.add_argument('--host', default='127.0.0.1', help='address of the web page (127.0.0.1)')
+    p.add_argument('--port', type=int, default=8080, help='port of the web page (8080)')
+    p.add_argument('--record', type=Path, metavar='DIR', help='record all topics into this bag')
+    p.add_argument('--logs', type=Path, default=state / 'damadics_fd' / 'logs', metavar='DIR',
+                   help='where the output of every process goes (%(default)s)')
+    p.add_argument('--for', dest='seconds', type=float, metavar='S', help='end after so long [s]')
+    return p
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """
+    Run the fleet until a signal comes.
+
+    :param args: command line, `sys.argv` by default.
+    :return: exit code.
+    """
+    options = parser().parse_args(args)
+    options.dashboard = options.dashboard or options.show
+    stop: list[int] = []
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda signum, frame: stop.append(signum))
+    share = Path(get_package_share_directory('damadics_bringup'))
+    try:
+        valves = read_fleet(options.fleet or share / 'config' / 'demo_valve.yaml')
+        tasks = tasks_of(valves, options)
+        with Processes(options.logs) as processes:
+            keeper = Keeper(processes, tasks)
+            print(f'{len(valves)} valve(s): {", ".join(valve.name for valve in valves)}; '
+                  f'logs in {options.logs}; Ctrl-C ends all', flush=True)
+            if options.dashboard:
+                print(f'The dashboard opens at http://{options.host}:{options.port}', flush=True)
+            end = time.monotonic() + (options.seconds or 1e9)
+            while not stop and time.monotonic() < end:
+                time.sleep(LOOK)
+                keeper.look()
+    except (FleetError, ProcessError) as problem:
+        print(f'run: {problem}', file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

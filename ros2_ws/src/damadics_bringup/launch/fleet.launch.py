@@ -1,0 +1,57 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Start estimator and detector of every valve of a fleet, with what else is asked for."""
+
+from pathlib import Path
+
+from ament_index_python.packages import get_package_share_directory
+from damadics_bringup.fleet import read_fleet
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument, OpaqueFunction
+from launch.conditions import IfCondition
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node
+
+CONFIG = Path(get_package_share_directory('damadics_bringup'), 'config')
+
+
+def valves(context):
+    """Describe the nodes of every valve in the list."""
+    actions = []
+    for valve in read_fleet(LaunchConfiguration('fleet').perform(context)):
+        file = [str(valve.parameters)] if valve.parameters else []
+        topics = list(valve.topics.items())
+        actions += [
+            Node(package='damadics_fd', executable=node, namespace=valve.name,
+                 parameters=[*file, valve.settings_of(node)], remappings=topics,
+                 respawn=True, respawn_delay=1.0, output='screen')
+            for node in ('estimator', 'detector')
+        ]
+        actions.append(
+            Node(package='damadics_plant', executable='plant', namespace=valve.name,
+                 parameters=[{'duration': 1e8, 'wait_for_subscribers': 1,
+                              'actuator': valve.settings.get('actuator', valve.name),
+                              **valve.simulate}],
+                 remappings=topics, output='screen',
+                 condition=IfCondition(LaunchConfiguration('simulate')))
+        )
+    return actions
+
+
+def generate_launch_description():
+    """Describe what is started."""
+    return LaunchDescription([
+        DeclareLaunchArgument('fleet', default_value=str(CONFIG / 'fleet.yaml'),
+                              description='list of the valves'),
+        DeclareLaunchArgument('simulate', default_value='false',
+                              description='start a simulated plant for each valve'),
+        DeclareLaunchArgument('dashboard', default_value='false', description='start the page'),
+        DeclareLaunchArgument('record', default_value='false', description='record all topics'),
+        DeclareLaunchArgument('bag', default_value='fleet_bag', description='folder of the bag'),
+        OpaqueFunction(function=valves),
+        Node(package='damadics_fd', executable='recorder',
+             arguments=['--all', '--out', LaunchConfiguration('bag')], output='screen',
+             condition=IfCondition(LaunchConfiguration('record'))),
+        Node(package='damadics_dashboard', executable='dashboard', output='screen',
+             condition=IfCondition(LaunchConfiguration('dashboard'))),
+    ])
