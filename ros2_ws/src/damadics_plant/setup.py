@@ -24,6 +24,7 @@ setup(
         'console_scripts': [
             'plant = damadics_plant.plant:main',
             'simulate = damadics_plant.command:main',
+            'figures = damadics_plant.figures:main',
         ],
     },
 )

@@ -87,7 +87,7 @@ CATALOGUE: dict[str, FaultKind] = {
                   'too little supply air', 'P_z *= 1 - f, 0 below 120 kPa'),
         FaultKind(17, 'unexpected pressure change across the valve', _EXTERNAL, -1,
                   'pump or downstream fault',
-                  'f > 0: P2 *= 1 - f; f < 0: P1 *= 1 - |f|'),
+                  'f > 0: P2 *= 1 - f; f < 0: P1 *= 1 + f'),
         FaultKind(18, 'fully or partly opened bypass valve', _EXTERNAL, 0,
                   'medium passes beside the valve', 'bypass position X_b = 1 - f'),
         FaultKind(19, 'flow rate sensor fault', _EXTERNAL, -1,

@@ -7,14 +7,17 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import fields
+from pathlib import Path
 
 import numpy as np
 import pytest
 from damadics_fd.bag.columns import read_columns
 from damadics_fd.bag.definition import schema_text
 from damadics_fd.bag.errors import BagError
-from damadics_plant import campaign, scenario_names, simulate
+from damadics_plant import CATALOGUE, campaign, figures, scenario_names, simulate
 from damadics_plant.command import main
+from damadics_plant.parameters import LuGreActuator
 
 HEADER = 't,cv,x1,p1,p2,t1,flow,ps,fault,strength'
 
@@ -116,6 +119,22 @@ def test_many_scenarios_go_to_a_folder(tmp_path):
         'paper_friction.csv', 'f1_S.csv'}
     assert np.array_equal(table(tmp_path / 'runs' / 'f1_S.csv')['flow'],
                           simulate('f1_S', rate=1).flow)
+
+
+def test_readme_pictures_are_drawn(tmp_path):
+    pytest.importorskip('matplotlib')
+    assert figures.main(['--out', str(tmp_path)]) == 0
+    for name in ('step_response.png', 'fault_effects.png'):
+        assert (tmp_path / name).stat().st_size > 10_000
+
+
+def test_readme_tables_are_those_of_the_code():
+    readme = (Path(__file__).parents[1] / 'README.md').read_text()
+    for kind in CATALOGUE.values():
+        row = f'| {kind.key} | {kind.name} | {kind.group} | {kind.minimum:g}..1 |'
+        assert f'{row} {kind.meaning} | {kind.injection} |' in readme
+    for field in fields(LuGreActuator):
+        assert f'| `{field.name}` | {field.default:g} |' in readme
 
 
 @pytest.mark.parametrize('names', [['f5_I'], ['f5_I', 'f6_I', 'f9_I']])

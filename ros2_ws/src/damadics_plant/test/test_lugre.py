@@ -78,6 +78,17 @@ def test_agrees_with_radau(fault):
     assert np.abs(x - reference[:len(x)]).max() < 3e-4
 
 
+@pytest.mark.parametrize(('h', 'friction'), [(2.5e-3, 1), (1e-3, 21)])
+def test_explicit_schemes_diverge(h, friction):
+    """Guard the implicit scheme: a simpler one would not do."""
+    y = np.array([0.7, 0.7, 0.0207, 0.0, 0.0266, 2e-5])
+    with np.errstate(all='ignore'):
+        for _ in range(400):
+            y = y + h * np.array(
+                derivatives(0, y, 0.7, 0.01, lambda t: friction - 1, lambda t: 0.0))
+    assert not np.abs(y[3]) < 1
+
+
 def test_constants_can_be_spread():
     stiff = simulate('random_nominal', model=LuGreActuator(stiffness=60892 * 1.04), duration=30)
     sticky = simulate('random_nominal', model=LuGreActuator(coulomb=250, static=350), duration=30)

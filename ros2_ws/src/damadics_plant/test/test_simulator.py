@@ -73,6 +73,15 @@ def test_seed_decides_the_noise():
     assert not np.array_equal(runs[0].x1, runs[2].x1)
 
 
+@pytest.mark.parametrize(('model', 'values'), [
+    ('dablib', [0.04875771072716806, 0.23100571226817979, 3489386.3531229743, 162129.902315901]),
+    ('lugre', [0.04875771072716806, 0.2486307297231431, 3495982.5781912585, 173515.0544567246]),
+])
+def test_seed_means_the_same_on_every_python(model, values):
+    run = simulate('random_friction', rate=1, model=model, noise=True, seed=5)
+    assert [run.cv[40], run.x1[40], run.p1[50], run.ps[111]] == pytest.approx(values, rel=1e-9)
+
+
 def test_noise_is_that_of_the_benchmark():
     scenario = Scenario('test', 200, cv=Constant(0.5))
     noisy, quiet, plain = (simulate(scenario, noise=noise) for noise in (True, 'cv', False))
