@@ -37,8 +37,8 @@ FACTORS = np.geomspace(0.25, 4.0, 33)  # of the limit, for the ROC and DET curve
 MARGIN = 1.1  # limit of a calibrated detector over its largest value on nominal days
 CALIBRATION_SEED = 1_000_100
 NOMINAL_SEED = 2_000_000
-ISOLATE_AFTER = (30, 60, 300)  # s after the alarm
-LATE_ISOLATIONS = 2  # in equal parts of what is left of the run
+ISOLATE_AFTER = (60, 300)  # s after the alarm
+LATE_ISOLATIONS = 1  # in equal parts of what is left of the run
 LIBRARIES = ('numpy', 'numba', 'river', 'filterpy', 'scikit-learn')
 
 

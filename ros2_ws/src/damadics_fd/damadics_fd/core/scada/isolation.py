@@ -18,10 +18,18 @@ from numpy.typing import NDArray
 from damadics_fd.core.jit import jit
 from damadics_fd.core.scada.actuator import F_RANGE, P_RANGE, T_RANGE, valve_flow
 from damadics_fd.core.scada.cusum import P1, P2, R2, T1, TESTS
-from damadics_fd.core.scada.model import FAULTS, STEM, STEM_FAULTS, advance_stem, copy_stem
+from damadics_fd.core.scada.model import (
+    COARSE_SUB_STEPS,
+    FAULTS,
+    STEM,
+    STEM_FAULTS,
+    advance_stem,
+    copy_stem,
+)
 from damadics_fd.core.scada.step import HISTORY_LENGTH
 
 WINDOW = 600  # samples at most
+FIRST = 240  # of them for the coarse search
 SHORTEST = 20
 MINIMUM_ERROR = 1e-12
 INCIPIENT_ONLY = frozenset({3, 4, 5, 6, 9})  # no physical background as abrupt faults
@@ -120,7 +128,8 @@ def _stem_error(
     for i in range(window.shape[0]):
         e = window[i]
         x = advance_stem(
-            stem, act, fault, e.t0, e.t, e.cv0, e.cv, e.dp0, e.dp, e.slope0, e.slope
+            stem, act, fault, e.t0, e.t, e.cv0, e.cv, e.dp0, e.dp, e.slope0, e.slope,
+            COARSE_SUB_STEPS,
         )
         total += (e.x - x - e.correction) ** 2
     return total / window.shape[0]
@@ -187,11 +196,15 @@ class Isolator:
             test = int(state['test'])
             abrupt = test < len(TESTS) and TESTS[test].k0 >= 1.5
         shown = self._inputs(state, window)
-        self._nominal = self._errors(window, None, None)
-        coarse = {fault: self._grid(window, fault) for fault in HYPOTHESES}
+        part = window[:FIRST]
+        self._nominal = self._errors(part, None, None)
+        coarse = {fault: self._grid(part, fault) for fault in HYPOTHESES}
         order = sorted(HYPOTHESES, key=lambda fault: min(coarse[fault])[0])
+        self._nominal = self._errors(window, None, None)
         ranking = [self._refine(window, fault, coarse[fault]) for fault in order[:REFINED]]
-        ranking += [Hypothesis(fault, *min(coarse[fault])[::-1]) for fault in order[REFINED:]]
+        for fault in order[REFINED:]:
+            strength = min(coarse[fault])[1]
+            ranking.append(Hypothesis(fault, strength, self.cost(window, fault, strength)))
         if abrupt:
             ranking = [
                 Hypothesis(h.fault, h.strength, h.cost + ABRUPT_PRIOR)
@@ -288,7 +301,7 @@ class Isolator:
         """Refine the best strength by golden section between its neighbours on the grid."""
         i = grid.index(min(grid))
         low, high = grid[max(i - 1, 0)][1], grid[min(i + 1, len(grid) - 1)][1]
-        best = grid[i]
+        best = (self.cost(window, fault, grid[i][1]), grid[i][1])
         left, right = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
         at_left = self.cost(window, fault, left)
         at_right = self.cost(window, fault, right)

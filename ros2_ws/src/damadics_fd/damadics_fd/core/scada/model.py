@@ -15,7 +15,8 @@ import numpy as np
 from damadics_fd.core.jit import jit
 from damadics_fd.core.scada.actuator import P_RANGE, pressure_recovery
 
-SUB_STEPS = 14
+SUB_STEPS = 14  # of 2.5 ms; a day's drift against the plant is then 1e-4 of stroke
+COARSE_SUB_STEPS = 7  # enough for minutes
 ATMOSPHERE = 101325.0
 GAS = 287.0 * 293.0
 MINIMUM_SUPPLY = 1.2e5
@@ -84,7 +85,7 @@ def transducer(cvi: float) -> float:
 def advance_stem(
     m: Any, act: Any, fault: Any,
     t0: float, t1: float, cv0: float, cv1: float,
-    dp0: float, dp1: float, slope0: float, slope1: float,
+    dp0: float, dp1: float, slope0: float, slope1: float, sub_steps: int = SUB_STEPS,
 ) -> float:  # fmt: skip
     """
     Advance the stem from t0 to t1 and return its measured position, 0..1.
@@ -100,12 +101,15 @@ def advance_stem(
     :param cv0: CV at t0; cv1 at t1.
     :param dp0: pressure drop at t0, share of 4 MPa; dp1 at t1.
     :param slope0: its slope at t0, 1/s; slope1 at t1.
+    :param sub_steps: Euler steps per controller tick.
     :return: X', the position a sensor shows.
     """
     dt = t1 - t0
     lag = math.exp(-act.tick_s / act.filter_s)
-    h = act.tick_s / SUB_STEPS
+    h = act.tick_s / sub_steps
+    mobility = h / act.viscous
     stroke = act.stroke
+    per_stroke = 1.0 / stroke
     area = act.area * (1.0 - fault.f10)
     spring = act.spring * (1.0 - fault.f11)
     supply = act.supply * (1.0 - fault.f16)
@@ -147,31 +151,32 @@ def advance_stem(
         e = min(max(e, -1.0), 1.0)
         source = supply if e > 0.0 else 0.0
         flow = act.beta * abs(e)
-        for _ in range(SUB_STEPS):
+        for _ in range(sub_steps):
             gauge = p - ATMOSPHERE
             volume = act.volume + area * X
             delta = source - gauge
             md = flow * math.copysign(math.sqrt(abs(delta)), delta)
             if leak > 0.0:
                 md -= leak * math.copysign(math.sqrt(abs(gauge)), gauge)
-            plug = thrust / pressure_recovery(X / stroke + offset)
+            plug = thrust / pressure_recovery(X * per_stroke + offset)
             force = act.weight + area * gauge - plug - spring * (X + act.compression)
             if (force <= 0.0 and X <= 0.0) or (force > 0.0 and top <= X):
                 force = 0.0
-            v = force / act.viscous
-            x = min(max(x + h * v, -0.05 * stroke), 1.25 * stroke)
+            step = mobility * force
+            x = min(max(x + step, -0.05 * stroke), 1.25 * stroke)
             half = 0.5 * play0
             if fault.f8 != 0.0:
-                half *= 1.0 + 0.5 * fault.f8 * (1.0 - X / stroke)
-            if v > 0.0:
+                half *= 1.0 + 0.5 * fault.f8 * (1.0 - X * per_stroke)
+            if step > 0.0:
                 X = max(X, x - half)
-            elif v < 0.0:
+            elif step < 0.0:
                 X = min(X, x + half)
             X = min(max(X, 0.0), top)
-            speed = min(max(v, -0.02), 0.02)
-            p += h * p / volume * (md * volume / m_a - area * speed)
+            travel = min(max(step, -0.02 * h), 0.02 * h)
+            inflow = h * md
+            p += p * (inflow / m_a - area * travel / volume)
             p = min(max(p, 0.0), 7.0e5)
-            m_a = min(max(m_a + h * md, 1e-9), 0.1)
+            m_a = min(max(m_a + inflow, 1e-9), 0.1)
         y1_next = u - (u - y1) * lag
         mean = 0.5 * (y1 + y1_next)
         y2 = mean - (mean - y2) * lag
