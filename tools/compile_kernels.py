@@ -7,6 +7,7 @@ from damadics_fd.bag import kernels
 from damadics_fd.core.detector import Detector
 from damadics_fd.core.estimator import Estimator
 from damadics_fd.core.pipeline import run
+from damadics_fd.core.scada.monitor import ScadaMonitor
 from damadics_fd.core.settings import Settings
 from damadics_plant import simulate
 
@@ -21,3 +22,6 @@ run({'stamp': np.array([1]), **columns}, settings)
 kernels.warm_up()
 for model in ('dablib', 'lugre'):
     simulate('nominal', model=model, duration=0.0)
+monitor = ScadaMonitor()
+monitor.run(simulate('f11@0.5', rate=1.0, duration=960.0))
+monitor.isolate()

@@ -12,8 +12,8 @@ from damadics_msgs.srv import Reference as ReferenceService
 from damadics_msgs.srv import Relearn
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 
-from damadics_fd.core.estimator import Estimator
 from damadics_fd.core.quality import EXPLANATIONS
+from damadics_fd.core.scada.estimator import estimator_for
 from damadics_fd.reference import Reference, ReferenceFileError, load_reference, save_reference
 from damadics_fd.ros import qos
 from damadics_fd.ros.conversions import sample, write_estimate
@@ -32,8 +32,8 @@ class EstimatorNode(MonitoringNode):
 
     def __init__(self) -> None:
         super().__init__('estimator', 'measurement', START_PLANT)
-        Estimator(self.settings).update(*READY)
-        self._core = Estimator(self.settings)
+        estimator_for(self.settings).update(*READY)
+        self._core = estimator_for(self.settings)
         self._message = EstimateMessage()
         self._last = self._core.phase
         self._refused_before = 0

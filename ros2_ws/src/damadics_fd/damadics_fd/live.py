@@ -20,7 +20,7 @@ from tqdm import tqdm
 from damadics_fd.bag.columns import Columns
 from damadics_fd.bag.recording import SIGNALS, Recording
 from damadics_fd.core.detector import Detector
-from damadics_fd.core.estimator import Estimator
+from damadics_fd.core.scada.estimator import estimator_for
 from damadics_fd.core.settings import Settings
 from damadics_fd.offline import Plan, joined
 from damadics_fd.ros import qos
@@ -48,7 +48,7 @@ class Player(Node):
         self._state = self.create_publisher(FaultState, 'fault_state', samples)
         self._judges = None
         if settings:
-            self._judges = Estimator(settings), Detector(settings)
+            self._judges = estimator_for(settings), Detector(settings)
             self._estimate = self.create_publisher(EstimateMessage, 'estimate', samples)
             self._residual = self.create_publisher(Float64Stamped, 'residual', samples)
             self._threshold = self.create_publisher(Float64Stamped, 'threshold', samples)

@@ -17,7 +17,8 @@ from damadics_fd.core.estimation import ESTIMATE
 from damadics_fd.core.estimator import Estimator
 from damadics_fd.core.events import Event, events_of
 from damadics_fd.core.jit import jit
-from damadics_fd.core.quality import SIGNALS
+from damadics_fd.core.quality import REASONS, SIGNALS
+from damadics_fd.core.scada.estimator import ScadaEstimator, estimator_for
 from damadics_fd.core.settings import Settings
 
 
@@ -121,7 +122,7 @@ def run(columns: Mapping[str, NDArray[Any]], settings: Settings,
     :raises KeyError: where `stamp`, `cv` or `x1` is absent.
     :raises ValueError: where the columns differ in length.
     """
-    estimator = estimator or Estimator(settings)
+    estimator = estimator or estimator_for(settings)
     detector = detector or Detector(settings)
     missing = [name for name in ('stamp', 'cv', 'x1') if name not in columns]
     if missing:
@@ -135,12 +136,29 @@ def run(columns: Mapping[str, NDArray[Any]], settings: Settings,
     reason = np.zeros(len(stamp), np.uint8)
     estimates = np.zeros(len(stamp), ESTIMATE)
     decisions = np.zeros(len(stamp), DECISION)
+    if isinstance(estimator, ScadaEstimator):
+        _run_scada(estimator, detector, stamp, signals, reason, estimates, decisions)
+        _blank(reason, stamp, estimates, decisions)
+        return Result(reason, estimates, decisions, estimator, detector)
     cv, x1, p1, p2, t1, flow, ps = signals
     loop(estimator.quality, estimator.state, detector.state, settings.record(),
          detector.signature.state, detector.signature.record, stamp, cv, x1, p1, p2, t1, flow, ps,
          reason, estimates, decisions)
     _blank(reason, stamp, estimates, decisions)
     return Result(reason, estimates, decisions, estimator, detector)
+
+
+def _run_scada(estimator: ScadaEstimator, detector: Detector, stamp: NDArray[np.int64],
+               signals: list[NDArray[np.float64]], reason: NDArray[np.uint8],
+               estimates: NDArray[Any], decisions: NDArray[Any]) -> None:
+    rows = zip(stamp.tolist(), *(signal.tolist() for signal in signals), strict=True)
+    for i, row in enumerate(rows):
+        estimate = estimator.update(*row)
+        if estimate is None:
+            reason[i] = REASONS.index(estimator.last_rejection.split(':')[0])
+            continue
+        estimates[i] = tuple(estimate)
+        decisions[i] = tuple(detector.update(estimate))[:len(DECISION.names or ())]
 
 
 def _blank(reason: NDArray[np.uint8], stamp: NDArray[np.int64], estimates: NDArray[Any],

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damadics_fd.core.jit import jit
-from damadics_fd.core.modes import MONITOR
+from damadics_fd.core.modes import MONITOR, PAPER
 
 REASONS = ('accepted', 'not_finite', 'out_of_range', 'zero_stamp', 'duplicate', 'out_of_order')
 ACCEPTED, NOT_FINITE, OUT_OF_RANGE, ZERO_STAMP, DUPLICATE, OUT_OF_ORDER = range(len(REASONS))
@@ -56,8 +56,8 @@ def signal_fault(c: Any, index: int, value: float) -> int:
     """
     Judge one signal by its place in SIGNALS.
 
-    Paper mode needs cv and x1, monitor mode also p1, p2, ps; t1 and flow are used by neither,
-    so only an infinite value, the mark of a corrupt sample, is refused there.
+    Paper mode needs cv and x1, monitor and scada mode also p1 and p2, monitor mode ps; t1 and
+    flow may be missing, only an infinite value, the mark of a corrupt sample, is refused there.
 
     :param c: settings record.
     :param index: place in SIGNALS.
@@ -65,10 +65,11 @@ def signal_fault(c: Any, index: int, value: float) -> int:
     :return: ACCEPTED, NOT_FINITE or OUT_OF_RANGE.
     """
     force = c.mode == MONITOR
+    drop = c.mode != PAPER
     if index <= 1:
         return value_fault(value, c.signal_low, c.signal_high, True)
     if index <= 3:
-        return value_fault(value, -0.025 * c.p_max, c.p_max, force)
+        return value_fault(value, -0.025 * c.p_max, c.p_max, drop)
     if index == 6:
         return value_fault(value, -0.025 * c.ps_max, c.ps_max, force)
     return NOT_FINITE if math.isinf(value) else ACCEPTED

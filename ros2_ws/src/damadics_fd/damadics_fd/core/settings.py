@@ -29,6 +29,13 @@ class SettingsError(ValueError):
         super().__init__('; '.join(problems))
 
 
+# Mode scada: the tests bring their own limits, so the detector's threshold is 1; see core/scada.
+SCADA = {
+    'sample_rate': 1.0, 'rho_min': 1.0, 'decide_m': 1, 'decide_n': 1, 't_on': 300.0, 't_w': 60.0,
+    't_learn': 900.0, 'gate_low': 0.0, 'gate_high': 0.0, 'gap_reset': 30.0, 'hold': 120.0,
+}
+
+
 def _number(unit: str, text: str, low: float, high: float, paper: Any, monitor: Any) -> Any:
     meta = {'unit': unit, 'description': text, 'low': low, 'high': high,
             'default': {'paper': paper, 'monitor': monitor}}
@@ -68,7 +75,8 @@ class Settings:
     damadics_fd.core.settings.SettingsError: k1 = -1.0 1/s is outside 0.001..1e+06; ...
     """
 
-    mode: str = _choice('paper: the printed method; monitor: learn, freeze, detect', MODES,
+    mode: str = _choice('paper: the printed method; monitor: learn, freeze, detect; '
+                        "scada: a control room's signals at 1 Hz", MODES,
                         'paper', 'monitor')
     sample_rate: float = _number('Hz', 'nominal sample rate of the measurement', 0.01, 1e5,
                                  400.0, 200.0)
@@ -179,6 +187,12 @@ class Settings:
     chamber_volume: float = _number('m3', 'dead volume of the servomotor', 0.0, 10.0, 5.5e-3,
                                     5.5e-3)
 
+    # SCADA-rate monitor
+    false_alarm_days: float = _number('d', 'mode scada: days per false alarm', 0.01, 1e5,
+                                      30.0, 30.0)
+    sensor_noise: float = _number('', 'mode scada: standard deviation of the sensors / full scale',
+                                  1e-6, 0.1, 1.414e-3, 1.414e-3)
+
     # input check
     signal_low: float = _number('', 'cv and x1 below it are refused (NAMUR NE 43: 3.6 mA)', -1.0,
                                 0.0, -0.025, -0.025)
@@ -209,7 +223,7 @@ class Settings:
         """
         Return the settings of a mode.
 
-        :param mode: 'paper' or 'monitor'.
+        :param mode: 'paper', 'monitor' or 'scada'.
         :param changes: settings that differ from the mode's defaults.
         :return: the settings.
         :raises SettingsError: listing all unknown names and wrong values.
@@ -230,7 +244,7 @@ class Settings:
         mode = values.get('mode', 'monitor')
         if mode not in MODES:
             raise SettingsError([*problems, _wrong_choice('mode', mode, MODES)])
-        merged = {name: item.metadata['default'][mode] for name, item in known.items()}
+        merged = {name: _default(item, mode) for name, item in known.items()}
         merged.update({name: value for name, value in values.items() if name in known})
         try:
             settings = cls(**merged)
@@ -278,7 +292,7 @@ class Settings:
             `description` and `low`, `high` or `choices` where they apply.
         """
         return [{**item.metadata, 'name': item.name, 'type': type(item.default),
-                 'default': item.metadata['default'][mode]} for item in fields(cls)]
+                 'default': _default(item, mode)} for item in fields(cls)]
 
     def record(self) -> NDArray[Any]:
         """
@@ -305,6 +319,11 @@ def _dtype() -> np.dtype:
                else (item.name, kinds[type(item.default)]) for item in fields(Settings)]
     derived = [(name, 'f8') for name in ('dt', 'weight', 'area_per_force', 'plug_per_force')]
     return np.dtype((np.record, np.dtype([*columns, *derived], align=True)))
+
+
+def _default(item: Field, mode: str) -> Any:
+    defaults = item.metadata['default']
+    return SCADA.get(item.name, defaults['monitor']) if mode == 'scada' else defaults[mode]
 
 
 def _wrong_choice(name: str, value: Any, options: tuple[str, ...]) -> str:

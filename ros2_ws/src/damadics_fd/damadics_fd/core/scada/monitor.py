@@ -170,6 +170,32 @@ class ScadaMonitor:
         self._learn_until = self.settings.learn_s
         self._trace = np.zeros(1, TRACE)
 
+    def forget(self) -> None:
+        """Forget every sample and any reference: learn from the next sample on."""
+        self._given = None
+        self.reset()
+
+    def resume(self) -> None:
+        """Start the models afresh at the next sample, for a clock that was set; keep the alarm."""
+        if self.reference is None:
+            self.reset()
+            return
+        before, self._state = self._state, np.zeros(1, MONITOR)
+        for name in ('alarm', 't_alarm', 't_onset', 'test'):
+            self._state[name] = before[name]
+
+    @property
+    def _last_learned(self) -> float:
+        """Return the time of the last sample of the learning record since the first one, s."""
+        return self._learn_until - self.settings.period_s
+
+    @property
+    def progress(self) -> float:
+        """Return the share of the learning that is done, 0..1."""
+        if self.reference is not None:
+            return 1.0
+        return min(float(self.state.t - self.state.t_first) / self._learn_until, 1.0)
+
     @property
     def state(self) -> Any:
         """Return the record of the compiled step."""
@@ -247,12 +273,12 @@ class ScadaMonitor:
             self._buffer = larger
         before = self._filled
         start, self._filled = _collect(
-            self._state, self._record, samples, start, self._buffer, before, self._learn_until
+            self._state, self._record, samples, start, self._buffer, before, self._last_learned
         )
         quiet = np.zeros(self._filled - before, TRACE)
         quiet['t'] = self._buffer[before : self._filled, 0]
         quiet['r1'] = quiet['r2'] = np.nan
-        if self._filled and self.state.t - self.state.t_first >= self._learn_until:
+        if self._filled and self.state.t - self.state.t_first >= self._last_learned:
             self._arm()
         return start, np.concatenate((learned, quiet))
 
