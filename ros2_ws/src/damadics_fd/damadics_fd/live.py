@@ -17,7 +17,7 @@ from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
 from tqdm import tqdm
 
-from damadics_fd.bag.columns import Columns
+from damadics_fd.bag.decoder import Columns
 from damadics_fd.bag.recording import SIGNALS, Recording
 from damadics_fd.core.detector import Detector
 from damadics_fd.core.scada.estimator import estimator_for
@@ -28,7 +28,7 @@ from damadics_fd.ros.conversions import event_message, set_stamp, write_estimate
 
 CLOCK_PERIOD = 0.01  # [s] of wall time between two messages on /clock
 HEARTBEAT = 10**9  # [ns] of scenario time between two flags without change
-DISCOVERY = 1.0  # [s] given to subscribers to find the publishers
+DISCOVERY = 1.0  # [s] without a new subscriber before the first sample
 
 
 class Player(Node):
@@ -57,6 +57,28 @@ class Player(Node):
         self._begin: tuple[int, float] | None = None  # stamp [ns] and wall time [s] of the start
         self._last_clock = 0.0
         self._shown: tuple[Any, ...] = ()
+
+    def wait_for_subscribers(self, needed: bool) -> None:
+        """Wait until all subscribers are matched; where they are needed, until there is one."""
+        quiet_since = time.monotonic()
+        last_known = -1
+        told = False
+        while rclpy.ok():
+            time.sleep(0.05)
+            matched = self._measurement.get_subscription_count()
+            known = self.count_subscribers(self._measurement.topic_name)
+            now = time.monotonic()
+            if known != last_known or matched < known:
+                last_known, quiet_since = known, now
+            if now - quiet_since >= DISCOVERY:
+                if matched or not needed:
+                    return
+                if not told:
+                    self.get_logger().info(
+                        'waiting for a node that subscribes to measurement: ros2 run damadics_fd'
+                        ' estimator'
+                    )
+                    told = True
 
     def play(self, columns: Columns) -> Iterator[int]:
         """
@@ -146,7 +168,7 @@ def publish(
         for recording in recordings:
             settings = Settings.for_mode(plan.mode, **plan.settings)
             player = Player(None if inputs_only else settings, rate)
-            time.sleep(DISCOVERY)
+            player.wait_for_subscribers(inputs_only)
             with tqdm(unit=' samples', unit_scale=True, desc=recording.name, disable=None) as bar:
                 truth = recording.truth(lambda text: None)
                 for columns in joined(recording.chunks(_warn)):

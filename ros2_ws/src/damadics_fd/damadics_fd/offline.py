@@ -12,7 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from damadics_fd.bag import kernels
-from damadics_fd.bag.columns import Columns
+from damadics_fd.bag.decoder import Columns
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.flags import FlagWriter
 from damadics_fd.bag.recording import Recording, origin

@@ -5,7 +5,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from damadics_fd.bag.columns import Columns
+from damadics_fd.bag.decoder import Columns
 from damadics_fd.core.pipeline import Result
 
 MOST_ROWS = 200_000  # kept, before they are thinned further

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from damadics_fd.bag.columns import Decoder
+from damadics_fd.bag.decoder import Decoder
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.limits import Limits
 from damadics_fd.bag.reader import Batch, McapFile

@@ -89,19 +89,36 @@ def gather4(data: NDArray, starts: NDArray, offset: int, out: NDArray) -> None:
 
 
 @jit
-def gather8(data: NDArray, starts: NDArray, offsets: NDArray, out: NDArray) -> None:
-    """Copy k 64-bit fields of each message; `offsets` is (k,), `out` is (k, n) uint64."""
+def gather8(data: NDArray, starts: NDArray, offsets: NDArray, out: NDArray, first: int) -> None:
+    """Copy k 64-bit fields of n messages to columns `first`.. of `out`, uint64 with k rows."""
     for i in range(len(starts)):
         for j in range(len(offsets)):
-            out[j, i] = word8(data, starts[i] + offsets[j])
+            out[j, first + i] = word8(data, starts[i] + offsets[j])
 
 
 @jit
-def gather_stamp(data: NDArray, starts: NDArray, offset: int, out: NDArray) -> None:
-    """Copy a little-endian builtin_interfaces/Time of each message; `out` is (n,) int64 [ns]."""
+def select(channels: NDArray, starts: NDArray, sizes: NDArray, channel: int) -> tuple[int, int]:
+    """
+    Move the places of one channel's messages to the front of `starts`.
+
+    :return: number of messages, and their size, -1 where they differ.
+    """
+    n = 0
+    size = 0
+    for i in range(len(starts)):
+        if channels[i] == channel:
+            size = sizes[i] if n == 0 or sizes[i] == size else -1
+            starts[n] = starts[i]
+            n += 1
+    return n, size
+
+
+@jit
+def gather_stamp(data: NDArray, starts: NDArray, offset: int, out: NDArray, first: int) -> None:
+    """Copy a little-endian builtin_interfaces/Time of n messages to `out` from `first` on [ns]."""
     for i in range(len(starts)):
         seconds = np.int64(np.int32(word4(data, starts[i] + offset)))
-        out[i] = seconds * 1_000_000_000 + np.int64(word4(data, starts[i] + offset + 4))
+        out[first + i] = seconds * 1_000_000_000 + np.int64(word4(data, starts[i] + offset + 4))
 
 
 @jit
@@ -133,6 +150,7 @@ def warm_up() -> None:
     index(data, np.empty(3, np.uint16), np.empty(3, np.int64), np.empty(3, np.int64), starts)
     gather2(data, starts, 0, np.empty(1, np.uint16))
     gather4(data, starts, 0, np.empty(1, np.uint32))
-    gather8(data, starts, words, np.empty((1, 1), np.uint64))
-    gather_stamp(data, starts, 0, np.empty(1, np.int64))
+    gather8(data, starts, words, np.empty((1, 1), np.uint64), 0)
+    gather_stamp(data, starts, 0, np.empty(1, np.int64), 0)
+    select(np.empty(0, np.uint16), starts[:0], starts[:0], 0)
     same_layout(data, starts, 1, words, np.zeros(1, np.uint32), np.empty(1, bool))

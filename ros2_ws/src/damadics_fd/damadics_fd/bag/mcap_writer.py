@@ -32,6 +32,7 @@ from damadics_fd.bag.records import (
 
 LIBRARY = 'damadics_fd'
 CHUNK_SIZE = 1 << 20  # [B] uncompressed
+LEVEL = -1  # of zstd: 2 % larger than 1, and twice as fast to read
 
 
 class Sink(Protocol):
@@ -73,8 +74,8 @@ class McapWriter:
     """
 
     def __init__(
-        self, stream: Sink, profile: str = 'ros2', chunk_size: int = CHUNK_SIZE, level: int = 1,
-        message_index: bool = True,
+        self, stream: Sink, profile: str = 'ros2', chunk_size: int = CHUNK_SIZE,
+        level: int = LEVEL, message_index: bool = True,
     ):
         self._stream = stream
         self._chunk_size = chunk_size

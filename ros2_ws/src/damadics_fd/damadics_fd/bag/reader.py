@@ -78,7 +78,7 @@ class Batch:
         """Return the log times of some messages [ns]."""
         out = np.empty((1, len(self.starts[rows])), np.uint64)
         offsets = np.array([-16], np.int64)
-        kernels.gather8(self.data, self.starts[rows], offsets, out)
+        kernels.gather8(self.data, self.starts[rows], offsets, out, 0)
         return out[0].view(np.int64)
 
     def message(self, row: int) -> bytes:

@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from damadics_fd.bag.columns import Columns, iter_columns, read_columns
+from damadics_fd.bag.columns import iter_columns, read_columns
+from damadics_fd.bag.decoder import Columns
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.reader import McapFile
 from damadics_fd.bag.sources import bag_files, find_bags

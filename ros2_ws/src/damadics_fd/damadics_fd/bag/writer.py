@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from damadics_fd.bag.cdr import encode_columns
 from damadics_fd.bag.definition import parse_definition, schema_text, type_hash
 from damadics_fd.bag.errors import BagError
-from damadics_fd.bag.mcap_writer import CHUNK_SIZE, McapWriter
+from damadics_fd.bag.mcap_writer import CHUNK_SIZE, LEVEL, McapWriter
 from damadics_fd.bag.rosbag2 import (
     METADATA_FILE,
     BagFile,
@@ -90,7 +90,7 @@ class BagWriter:
     def __init__(
         self, path: str | Path, *, split_bytes: int = 0, split_seconds: float = 0.0,
         quota_bytes: int = 0, chunk_size: int = CHUNK_SIZE, flush_period: float = FLUSH_PERIOD,
-        level: int = 1, message_index: bool = True,
+        level: int = LEVEL, message_index: bool = True,
         custom_data: Mapping[str, str] | None = None,
     ):
         self.path = Path(path)

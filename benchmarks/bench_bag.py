@@ -1,0 +1,198 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Measure reading, replaying and recording of bags against their peers, side by side in one run.
+
+    python benchmarks/bench_bag.py               # reading, replay, memory
+    python benchmarks/bench_bag.py --recorder    # recorder with publishers in other processes
+
+Times are CPU times of one process, the best of several runs: the ratios hold on a busy machine,
+the absolute figures are those of the machine.
+"""
+
+import argparse
+import os
+import random
+import resource
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from damadics_fd.bag import BagWriter, iter_columns, read_columns, write_columns
+from damadics_fd.bag.rosbag2 import qos
+
+SLOW_ROWS = 40_000  # read by the peers
+ROWS = 400_000
+MEASUREMENT = 'damadics_msgs/msg/Measurement'
+
+
+def recording(n: int, start: int = 0) -> dict[str, np.ndarray]:
+    """Return columns of a noisy valve at 200 Hz."""
+    rng = np.random.default_rng(start)
+    stamp = (np.arange(start, start + n) + 1) * 5_000_000
+    t = stamp / 1e9
+    x1 = 0.5 + 0.3 * np.sin(0.3 * t) + 1e-3 * rng.standard_normal(n)
+    return {
+        'stamp': stamp, 'cv': np.round(t / 20) % 2, 'x1': x1,
+        'p1': 3.5e6 + 1e4 * np.sin(t), 'p2': 2.6e6 + 1e4 * np.sin(t), 't1': np.full(n, 20.0),
+        'flow': 8 + np.sin(0.3 * t), 'ps': 1.4e5 + 6e4 * np.sin(0.3 * t),
+    }
+
+
+def cpu(task: Callable[[], object], repeats: int) -> float:
+    """Return the least CPU time of several runs [s]."""
+    spent = []
+    for _ in range(repeats):
+        begin = time.process_time()
+        task()
+        spent.append(time.process_time() - begin)
+    return min(spent)
+
+
+def reading(folder: Path) -> None:
+    """Columns against message-by-message decoding."""
+    from mcap.reader import make_reader
+    from mcap_ros2.decoder import DecoderFactory
+    from rosbags.highlevel import AnyReader
+
+    large, small = folder / 'large.mcap', folder / 'small.mcap'
+    write_columns(large, recording(ROWS))
+    write_columns(small, recording(SLOW_ROWS))
+
+    def mcap_ros2() -> None:
+        with small.open('rb') as stream:
+            reader = make_reader(stream, decoder_factories=[DecoderFactory()])
+            for _, _, _, message in reader.iter_decoded_messages(['/measurement']):
+                message.x1  # noqa: B018
+
+    def rosbags() -> None:
+        with AnyReader([small]) as reader:
+            for connection, _, raw in reader.messages():
+                reader.deserialize(raw, connection.msgtype).x1  # noqa: B018
+
+    read_columns(small)  # loads the compiled loops
+    own = cpu(lambda: read_columns(large), 7) / ROWS
+    pieces = cpu(lambda: [len(c['x1']) for c in iter_columns(large)], 7) / ROWS
+    print(f'{"reading /measurement":34}{"us/message":>12}{"ratio":>8}')
+    print(f'{"read_columns":34}{own * 1e6:12.3f}{1:8.0f}')
+    print(f'{"iter_columns":34}{pieces * 1e6:12.3f}{pieces / own:8.2f}')
+    for name, task in (('rosbags', rosbags), ('mcap + mcap-ros2-support', mcap_ros2)):
+        peer = cpu(task, 2) / SLOW_ROWS
+        print(f'{name:34}{peer * 1e6:12.3f}{peer / own:8.0f}')
+
+
+def replaying(folder: Path) -> None:
+    """Read, decode, estimate, detect on one core."""
+    from damadics_fd.bag.recording import Recording
+    from damadics_fd.offline import Plan, replay, warm_up
+
+    source = Recording(folder / 'large.mcap')
+    print(f'\n{"whole replay on one core":34}{"M samples/s":>12}{"day at 200 Hz":>16}')
+    for mode in ('paper', 'monitor'):
+        warm_up([Plan(mode)])
+        rate = ROWS / cpu(lambda mode=mode: replay(source, Plan(mode)), 5)
+        print(f'{mode:34}{rate / 1e6:12.2f}{86400 * 200 / rate:14.1f} s')
+
+
+def memory(folder: Path) -> None:
+    """Peak memory of a replay while the bag grows."""
+    print(f'\n{"samples":>12}{"bag":>12}{"peak memory":>16}')
+    for factor in (1, 10, 100):
+        path = folder / f'{factor}.mcap'
+        with BagWriter(path) as bag:
+            bag.add_topic('/measurement', MEASUREMENT, [qos()])
+            for start in range(0, 40_000 * factor, 40_000):
+                columns = recording(40_000, start)
+                stamp = columns.pop('stamp')
+                bag.write_columns(stamp, {'/measurement': columns}, 'LC74_20')
+        code = (
+            'import sys, resource; from damadics_fd.replay import main;'
+            'main([sys.argv[1], "--mode", "monitor", "--figures", sys.argv[2]]);'
+            'print("peak", resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3)'
+        )
+        out = subprocess.run([sys.executable, '-c', code, str(path), str(folder / 'figures')],
+                             capture_output=True, text=True, check=True).stdout
+        peak = float(out.split('peak')[-1])
+        print(f'{40_000 * factor:12,}{path.stat().st_size / 1e6:9.1f} MB{peak:13.0f} MB')
+
+
+PUBLISHER = """
+import sys, time, rclpy
+from rclpy.qos import QoSProfile
+from rclpy.serialization import serialize_message
+from damadics_msgs.msg import Measurement
+topic, rate, seconds = sys.argv[1], float(sys.argv[2]), float(sys.argv[3])
+rclpy.init()
+node = rclpy.create_node('source' + topic.replace('/', '_'))
+publisher = node.create_publisher(Measurement, topic, QoSProfile(depth=20000))
+message = Measurement()
+message.header.frame_id = 'LC74_20'
+raw = serialize_message(message)
+while not publisher.get_subscription_count():
+    time.sleep(0.05)
+time.sleep(0.5)
+begin = time.perf_counter()
+sent = 0
+while sent < rate * seconds:
+    for _ in range(max(1, int(rate / 200))):
+        publisher.publish(raw)
+        sent += 1
+    ahead = begin + sent / rate - time.perf_counter()
+    if ahead > 0:
+        time.sleep(ahead)
+print(sent, sent / (time.perf_counter() - begin), flush=True)
+time.sleep(2.0)
+"""
+
+
+def recorder(folder: Path, rate: float, seconds: float, publishers: int) -> None:
+    """Messages from other processes into a bag: how many, how many lost."""
+    env = os.environ | {'ROS_DOMAIN_ID': str(random.randrange(1, 100)),
+                        'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
+    bag = folder / 'recorded'
+    node = subprocess.Popen(
+        [sys.executable, '-m', 'damadics_fd.recorder', '--out', str(bag)], env=env,
+    )
+    time.sleep(3.0)
+    sources = [
+        subprocess.Popen([sys.executable, '-c', PUBLISHER, f'/m{i}', str(rate / publishers),
+                          str(seconds)], env=env, stdout=subprocess.PIPE, text=True)
+        for i in range(publishers)
+    ]
+    answers = [source.communicate()[0].split() for source in sources]
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    node.send_signal(signal.SIGTERM)
+    node.wait()
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    spent = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    sent = sum(int(count) for count, _ in answers)
+    got = sum(len(read_columns(bag, f'/m{i}', ['x1'])['x1']) for i in range(publishers))
+    pace = sum(float(speed) for _, speed in answers)
+    print(f'{publishers} publishers, {pace:,.0f} messages/s for {seconds:g} s: {sent:,} sent,'
+          f' {got:,} recorded, {sent - got:,} lost; recorder {spent / seconds:.0%} of a core')
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[0])
+    parser.add_argument('--recorder', action='store_true')
+    parser.add_argument('--rate', type=float, default=20_000.0, help='messages per second')
+    parser.add_argument('--seconds', type=float, default=60.0)
+    parser.add_argument('--publishers', type=int, default=2)
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        if options.recorder:
+            recorder(folder, options.rate, options.seconds, options.publishers)
+            return
+        reading(folder)
+        replaying(folder)
+        memory(folder)
+
+
+if __name__ == '__main__':
+    main()

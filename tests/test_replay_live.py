@@ -1,0 +1,109 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Live, offline and at any speed: the same flags and residuals, bit for bit."""
+
+import json
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rclpy
+from damadics_bringup.processes import Processes, free_domain, parameters, surroundings
+from damadics_fd.bag import read_columns, write_columns
+from damadics_fd.core.pipeline import run
+from damadics_fd.core.settings import Settings
+from damadics_fd.replay import main as replay
+from rclpy.context import Context
+
+pytestmark = pytest.mark.ros
+GOLDEN = Path(__file__).parents[1] / 'bags'
+# what the monitor learns from is shortened, so that it decides within the test
+QUICK = {'t_on': 0.5, 't_w': 1.0, 't_learn': 2.0, 'travel_min': 0.01}
+
+
+def excerpt(name: str, begin: float, end: float) -> dict[str, np.ndarray]:
+    columns = read_columns(GOLDEN / f'{name}.mcap')
+    time = columns.pop('stamp') / 1e9
+    del columns['log_time']
+    rows = (time >= begin) & (time < end)
+    stamp = np.round((time[rows] - begin) * 1e9).astype(np.int64) + 1_000_000
+    return {'stamp': stamp} | {signal: values[rows] for signal, values in columns.items()}
+
+
+@pytest.mark.parametrize(('mode', 'name', 'begin', 'speeds', 'changes'), [
+    ('paper', 'dablib_spring', 66.0, (2, 8), {}),
+    ('monitor', 'lugre_spring', 66.0, (4,), QUICK),
+])
+def test_live_and_offline_agree_bit_for_bit(tmp_path, mode, name, begin, speeds, changes):
+    columns = excerpt(name, begin, begin + 6.0)
+    source = tmp_path / 'source.mcap'
+    write_columns(source, columns)
+    result = run(columns, Settings.for_mode(mode, **changes))
+    rows = result.accepted
+    assert result.detections
+    recorded = [played(source, tmp_path / str(speed), mode, speed, changes) for speed in speeds]
+    for bag in recorded:
+        for topic, field in (('/residual', 'residual'), ('/threshold', 'threshold')):
+            topic_columns = read_columns(bag, topic)
+            assert topic_columns['stamp'].tolist() == columns['stamp'][rows].tolist()
+            expected = result.decisions[field][rows]
+            assert topic_columns['data'].tobytes() == expected.tobytes(), (bag, topic)
+        estimate = read_columns(bag, '/estimate')
+        for field in ('xi1', 'xi2', 'phi', 'x2_hat'):
+            assert estimate[field].tobytes() == result.estimates[field][rows].tobytes()
+        rises = edges(read_columns(bag, '/fault_flag'))
+        assert rises == [event.stamp for event in result.detections]
+        out = tmp_path / 'again.json'
+        settings = [f'--set={key}={value}' for key, value in changes.items()]
+        assert replay([str(bag), '--mode', mode, '--out', str(out), *settings]) == 0
+        (again,) = json.loads(out.read_text())
+        assert [d['stamp'] for d in again['detections']] == rises
+
+
+def edges(flags: dict[str, np.ndarray]) -> list[int]:
+    """Return the stamps at which the recorded flag rises."""
+    fault = flags['fault'].astype(bool)
+    return flags['stamp'][fault & ~np.concatenate(([False], fault[:-1]))].tolist()
+
+
+def played(source: Path, folder: Path, mode: str, speed: int, changes: dict) -> Path:
+    """Publish a recording to estimator, detector and recorder as processes; return the bag."""
+    domain = free_domain()
+    with Processes(folder / 'logs', surroundings(domain)) as processes:
+        processes.start('damadics_fd', 'recorder', ['--out', str(folder / 'bag')])
+        for node in ('detector', 'estimator'):
+            processes.start('damadics_fd', node, parameters(mode=mode, **changes))
+        wait_for_chain(domain, processes)
+        processes.start('damadics_fd', 'replay', [
+            str(source), '--live', '--inputs-only', '--rate', str(speed),
+        ])
+        wait_for_end(processes, 'replay')
+        processes.check()
+        for node in ('estimator', 'detector', 'recorder'):
+            processes.end(node)
+    return folder / 'bag'
+
+
+def wait_for_chain(domain: int, processes: Processes, patience: float = 120.0) -> None:
+    """Wait until estimator, detector and recorder take their topics."""
+    context = Context()
+    rclpy.init(context=context, domain_id=domain)
+    node = rclpy.create_node('watcher', context=context)
+    deadline = time.monotonic() + patience
+    wanted = {'measurement': 2, 'estimate': 2, 'residual': 1, 'threshold': 1, 'fault_flag': 1}
+    while any(node.count_subscribers(topic) < count for topic, count in wanted.items()):
+        assert time.monotonic() < deadline
+        processes.check()
+        time.sleep(0.1)
+    node.destroy_node()
+    context.try_shutdown()
+
+
+def wait_for_end(processes: Processes, name: str, patience: float = 100.0) -> None:
+    deadline = time.monotonic() + patience
+    while not processes.ended(name):
+        assert time.monotonic() < deadline
+        processes.check()
+        time.sleep(0.1)
+    time.sleep(1.0)  # the last messages pass through the chain
