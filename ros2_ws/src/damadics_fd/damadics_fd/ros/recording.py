@@ -133,20 +133,21 @@ class Recorder(Node):
             self._refuse(name, str(error))
             return
         put, now = self._spool.put, self._now
+        first = True
 
         def receive(data: bytes) -> None:
+            nonlocal first
+            if first:  # the channel is written with the first message: who publishes it?
+                first = False
+                infos = self.get_publishers_info_by_topic(name)
+                topic.offered_qos = [describe(info.qos_profile) for info in infos]
             put((topic, data, now()))
-
-        def receive_first(data: bytes) -> None:
-            self._look()  # the channel is written with the first message: who publishes it?
-            subscription.callback = receive
-            receive(data)
 
         events = SubscriptionEventCallbacks(
             message_lost=lambda event: self._lost.__setitem__(name, event.total_count)
         )
         subscription = self.create_subscription(
-            message_type, name, receive_first, matching(reliable, latched), raw=True,
+            message_type, name, receive, matching(reliable, latched), raw=True,
             event_callbacks=events,
         )
         self._recorded[name] = Recorded(topic, subscription, reliable, latched)
