@@ -27,7 +27,7 @@ _EXAMPLE = """\
 examples:
   simulate --list
   simulate paper_friction --out friction.mcap
-  simulate nominal --fault f11 --strength 0.5 --from 70 --out spring.csv --noise --seed 3
+  simulate --fault f11 --strength 0.5 --from 900 --noise --seed 3 --out spring.csv
   simulate nominal --cv 'plant.csv:LC74_20CV*0.01' --duration 3600 --rate 1 --out replayed.csv
   simulate all44 --rate 1 --out scenarios/
 """
@@ -44,7 +44,8 @@ def parser() -> argparse.ArgumentParser:
         prog='simulate', description='Simulate the DAMADICS actuator.', epilog=_EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter)
     p.add_argument('scenario', nargs='*', metavar='SCENARIO',
-                   help=f'names of --list, FILE.yaml[:NAME], fN@STRENGTH, or {ALL}')
+                   help=f'names of --list, FILE.yaml[:NAME], fN@STRENGTH, or {ALL};'
+                   ' nominal where there is only a --fault')
     p.add_argument('--out', type=Path, metavar='PATH',
                    help='FILE.csv or FILE.mcap; a folder where there are several scenarios')
     p.add_argument('--format', choices=('csv', 'mcap'), default='csv',
@@ -142,6 +143,8 @@ def main(args: Sequence[str] | None = None) -> int:
     if arguments.list or arguments.faults:
         _print_lists(arguments)
         return 0
+    if arguments.fault and not arguments.scenario:
+        arguments.scenario = ['nominal']
     if not arguments.scenario or not arguments.out:
         p.error('wants a scenario and --out FILE.csv or FILE.mcap (or --list)')
     names = list(arguments.scenario)

@@ -74,8 +74,10 @@ class Run(Mapping[str, np.ndarray]):
 
         :param rate: samples per second, a divisor of this run's.
         :return: the run with every n-th sample.
-        :raises ValueError: if the rate does not divide.
+        :raises ValueError: if the rate does not divide, or there is but one sample.
         """
+        if len(self.columns['stamp']) < 2:
+            raise ValueError('rate: a run of one sample has none')
         own = 1e9 / (self.columns['stamp'][1] - self.columns['stamp'][0])
         every = round(own / rate)
         if every < 1 or not math.isclose(every * rate, own, rel_tol=1e-6):

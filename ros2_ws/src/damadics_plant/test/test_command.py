@@ -73,7 +73,7 @@ def test_mcap_has_the_run_bit_for_bit(tmp_path):
 
 def test_fault_and_inputs_of_ones_own(tmp_path):
     out, again = tmp_path / 'a.csv', tmp_path / 'b.csv'
-    assert main(['nominal', '--fault', 'f19', '--strength', '-0.4', '--from', '5', '--to', '8',
+    assert main(['--fault', 'f19', '--strength', '-0.4', '--from', '5', '--to', '8',
                  '--duration', '10', '--rate', '1', '--out', str(out)]) == 0
     assert table(out)['strength'].tolist() == 5 * [0] + 3 * [-0.4] + 3 * [0]
     assert main(['nominal', '--cv', f'{out}:x1*0.5', '--duration', '10', '--rate', '1',
