@@ -44,8 +44,8 @@ def main(args: list[str] | None = None) -> int:
     path.write_text(json.dumps(results, indent=2) + '\n')
     console.print(_table(outcomes))
     for outcome in outcomes:
-        console.print(_remarks(outcome))
-    console.print(f'\nEverything is in [bold]{options.out}[/]: bags, figures, {path.name}.')
+        console.print(_remarks(outcome), soft_wrap=True)
+    console.print(f'\nThe results are also in [bold]{path}[/].')
     return 0 if all(outcome.agrees for outcome in outcomes) else 1
 
 
@@ -57,8 +57,8 @@ def parser() -> argparse.ArgumentParser:
         'the same core off line.', epilog='Example: ros2 run damadics_bringup demo --factor 5')
     top.add_argument('--out', type=Path, default=Path('demo'), metavar='DIR',
                      help='folder for bags, figures and results.json (default: demo)')
-    top.add_argument('--factor', type=float, default=8.0,
-                     help='seconds of scenario per second of wall time (default: 8)')
+    top.add_argument('--factor', type=float, default=5.0,
+                     help='seconds of scenario per second of wall time (default: 5)')
     top.add_argument('--only', choices=[e.name for e in EXPERIMENTS],
                      help='do this experiment only')
     return top
@@ -87,13 +87,10 @@ def _perform(
 
 
 def _table(outcomes: list[Outcome]) -> Table:
-    table = Table(title='The paper and this run')
-    for heading, side in (
-        ('experiment', 'left'), ('paper [s]', 'right'), ('live [s]', 'right'),
-        ('bag, off line [s]', 'right'), ('before the fault', 'left'), ('samples', 'right'),
-        ('lost', 'right'), ('bag', 'left'), ('MB', 'right'),
-    ):
-        table.add_column(heading, justify=side)  # type: ignore[arg-type]
+    table = Table(title='Instant of detection in s', title_justify='left')
+    table.add_column('experiment')
+    for heading in ('paper', 'live', 'from the bag', 'samples', 'lost', 'bag, MB'):
+        table.add_column(heading, justify='right')
     for outcome in outcomes:
         colour = 'green' if outcome.agrees else 'red'
         table.add_row(
@@ -101,10 +98,8 @@ def _table(outcomes: list[Outcome]) -> Table:
             f'{outcome.experiment.paper:.3f}',
             f'[{colour}]{_seconds(outcome.detected_at)}[/]',
             _seconds(outcome.offline_detected_at),
-            ', '.join(f'{t:.4f}' for t in outcome.before) or 'none',
             str(outcome.samples),
             str(outcome.lost),
-            str(outcome.bag),
             f'{outcome.bag_bytes / 1e6:.1f}',
         )
     return table
@@ -116,12 +111,14 @@ def _seconds(value: float | None) -> str:
 
 def _remarks(outcome: Outcome) -> str:
     same = 'bit for bit the same' if outcome.identical else '[red]NOT the same[/]'
+    before = ', '.join(f'{t:.4f}'.rstrip('0') for t in outcome.before) or 'none'
     return (
-        f'{outcome.experiment.name}: estimates, residual, threshold and decisions of the nodes '
-        f'and of the off-line core are {same} over {outcome.samples} samples.'
+        f'\n[bold]{outcome.experiment.name}[/]\n'
+        f'  decisions before the fault, as the printed method gives them: {before} s\n'
+        f'  nodes and off-line core are {same} over {outcome.samples} samples\n'
+        f'  {outcome.bag}\n'
+        f'  {outcome.figure}'
     )
-
-
 
 
 if __name__ == '__main__':

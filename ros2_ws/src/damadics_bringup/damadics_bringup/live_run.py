@@ -27,6 +27,7 @@ CHAIN = {  # the number of subscribers of each topic before the plant starts
     '/estimate': 2, '/residual': 1, '/threshold': 1, '/fault_flag': 1, '/fault_event': 1,
 }
 PATIENCE = 30.0  # s for the processes to discover each other
+WRITING = 120.0  # s for a process to end: the recorder may have much to write
 QUIET = 1.0  # s without news from the detector after which the queues are empty
 
 
@@ -121,7 +122,7 @@ def run(
             processes.check()
             watcher.spin_until(lambda: False, QUIET)
             for name in ('estimator', 'detector', 'recorder'):
-                processes.end(name)
+                processes.end(name, WRITING)
         finally:
             watcher.close()
     return bag

@@ -5,7 +5,7 @@
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 SECONDS_HELD = 2.0
-LEAST_DEPTH = 1000
+LEAST_DEPTH = 100_000  # samples: a process may be held up; memory is taken only when needed
 
 
 def samples(rate: float = 0.0) -> QoSProfile:
