@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Estimator and detector as processes: samples in, flags out, bad input, parameters, signals."""
 
+import os
 import signal
 import subprocess
 import time
@@ -20,6 +21,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 
 pytestmark = pytest.mark.ros
 PERIOD = 2_500_000  # ns
+SPEAK_AT_ONCE = {'PYTHONUNBUFFERED': '1', 'RCUTILS_LOGGING_BUFFERED_STREAM': '0'}
 
 
 @pytest.fixture
@@ -126,10 +128,12 @@ def test_a_node_alone_says_what_it_waits_for(processes, name):
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 def test_signals_end_a_node_with_exit_code_0(domain, tmp_path, name, number):
     arguments = ['--all', '--out', str(tmp_path / 'bag')] if name == 'recorder' else []
-    process = subprocess.Popen([executable('damadics_fd', name), *arguments])
+    process = subprocess.Popen(
+        [executable('damadics_fd', name), *arguments],
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, env={**os.environ, **SPEAK_AT_ONCE},
+    )
     try:
-        time.sleep(2.0)
-        assert process.poll() is None
+        assert process.stdout.readline(), 'the node did not start'
         process.send_signal(number)
         began = time.monotonic()
         assert process.wait(5.0) == 0
