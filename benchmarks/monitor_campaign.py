@@ -30,7 +30,7 @@ from damadics_plant.sources import RandomSteps, Sine
 RATE = 200.0
 FRICTION, SPRING = 'f4', 'f11'
 # the approximator alone: the signature's own alarm is measured by its own campaign
-APPROXIMATOR = Settings.for_mode('monitor', own_alarm=False)
+APPROXIMATOR = Settings.for_mode('monitor', signature=False, own_alarm=False)
 
 
 def random_valve(rng: np.random.Generator) -> LuGreActuator:
@@ -199,7 +199,7 @@ def day(runs: int, workers: int) -> dict[str, Any]:
     scenario, valve = random_scenario(7, hours * 3600.0)
     plant = Simulator(scenario, rate=RATE, model=valve, noise=True, seed=7)
     estimator = detector = None
-    worst, alarms, learned, thresholds = 0.0, [], None, set()
+    worst, alarms, learned = 0.0, [], []
     while not plant.finished:
         result = run(plant.advance(120_000), APPROXIMATOR, estimator, detector)
         estimator, detector = result.estimator, result.detector
@@ -210,10 +210,9 @@ def day(runs: int, workers: int) -> dict[str, Any]:
         if inside.any():
             worst = max(worst, float(result.decisions['ratio'][inside].max()))
         if armed.any():
-            thresholds |= {estimator.state[['w1', 'w2', 'eps1', 'b1', 'ah5']].tobytes()}
-            learned = learned or estimator.learned()
+            learned.append(estimator.learned())
     return {'hours': hours, 'alarms': alarms, 'largest_ratio': round(worst, 3),
-            'weights_bit_identical': len(thresholds) == 1 and learned == estimator.learned()}
+            'weights_bit_identical': all(row == learned[0] for row in learned)}
 
 
 def masking(runs: int, workers: int) -> dict[str, Any]:

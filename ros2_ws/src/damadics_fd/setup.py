@@ -33,6 +33,7 @@ setup(
             'replay = damadics_fd.replay:main',
             'verify = damadics_fd.verify:main',
             'recover = damadics_fd.recover:main',
+            'commission = damadics_fd.commission:main',
         ],
     },
 )
