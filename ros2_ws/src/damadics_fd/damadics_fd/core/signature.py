@@ -237,7 +237,7 @@ def judge(s: Any, c: Any) -> int:
             decide(s, c)
         if s.state == STATE_VERIFY:
             finish_verification(s, c)
-        elif air and s.state == STATE_MONITOR and supply_lost(s, c):
+        elif air and s.state == STATE_MONITOR and c.own_alarm != 0 and supply_lost(s, c):
             start_supply_alarm(s, c)
     return CHANGED if s.state * 10000 + s.family * 100 + s.cause != before else BLOCK
 
