@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -17,16 +17,13 @@ from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.flags import FlagWriter
 from damadics_fd.bag.recording import Recording, origin
 from damadics_fd.core.detector import Detector
-from damadics_fd.core.estimator import Estimator
 from damadics_fd.core.events import Event
 from damadics_fd.core.pipeline import Result, run
 from damadics_fd.core.quality import REASONS
-from damadics_fd.core.scada.cusum import TEST_NAMES
-from damadics_fd.core.scada.monitor import ScadaMonitor
+from damadics_fd.core.scada.estimator import estimator_for
 from damadics_fd.core.settings import Settings
 from damadics_fd.thinning import Thinner
 
-MODES = ('paper', 'monitor', 'scada')
 NANO = 1e9
 NAMING_S = (30.0, 300.0, np.inf)  # after an alarm; a later fault must not change the name
 STRIDE = 120  # rows between two attempts of mode scada to name a fault
@@ -61,32 +58,20 @@ class Outcome:
     error: str = ''
 
 
-class Engine(Protocol):
-    """Estimator and detector of one mode."""
-
-    def take(self, columns: Columns, zero: int) -> tuple[list[dict[str, Any]], Result | None]:
-        """Judge the next columns; return the detections, and the rows where the mode has them."""
-
-    @property
-    def refused(self) -> dict[str, int]:
-        """Samples refused so far, by reason."""
-
-
-class Approximator:
+class Chain:
     """
-    The on-line approximator with its detector, as the nodes run them.
+    Estimator and detector of a mode, as the nodes run them.
 
     :param settings: all settings.
     """
 
     def __init__(self, settings: Settings):
         self._settings = settings
-        self._estimator, self._detector = Estimator(settings), Detector(settings)
+        self._estimator, self._detector = estimator_for(settings), Detector(settings)
 
-    def take(self, columns: Columns, zero: int) -> tuple[list[dict[str, Any]], Result | None]:
+    def take(self, columns: Columns) -> Result:
         """Judge the next columns."""
-        result = run(columns, self._settings, self._estimator, self._detector)
-        return [evidence(event, zero) for event in result.detections], result
+        return run(columns, self._settings, self._estimator, self._detector)
 
     @property
     def refused(self) -> dict[str, int]:
@@ -116,72 +101,6 @@ def evidence(event: Event, zero: int) -> dict[str, Any]:
     }
 
 
-class Scada:
-    """The monitor for plant data at about 1 Hz."""
-
-    def __init__(self) -> None:
-        self._monitor = ScadaMonitor()
-        self._alarm = False
-        self._samples = 0
-        self._accepted = 0
-        self._detections: list[dict[str, Any]] = []
-        self._named = 0
-
-    def take(self, columns: Columns, zero: int) -> tuple[list[dict[str, Any]], Result | None]:
-        """Judge the next columns."""
-        if not {'p1', 'p2'} <= columns.keys():
-            raise BagError('mode scada needs the pressures p1 and p2')
-        found = []
-        for first in range(0, len(columns['stamp']), STRIDE):
-            part = {name: values[first:first + STRIDE] for name, values in columns.items()}
-            found += self._judge(part, zero)
-        return found, None
-
-    def _judge(self, columns: Columns, zero: int) -> list[dict[str, Any]]:
-        trace = self._monitor.run(columns)
-        self._samples += len(columns['stamp'])
-        self._accepted += len(trace)
-        alarm = trace['alarm']
-        before = np.concatenate(([self._alarm], alarm[:-1]))
-        if len(alarm):
-            self._alarm = bool(alarm[-1])
-        found = [
-            {
-                't': float(row['t'] - zero / NANO), 'stamp': round(float(row['t']) * NANO),
-                'residual_x': float(row['r1']), 'residual_flow': float(row['r2']),
-                'ratio': float(row['ratio']),
-                'test': TEST_NAMES[int(self._monitor.state.test)],
-                'onset': float(self._monitor.state.t_onset) - zero / NANO,
-                'text': 'too short a record to name the fault',
-            }
-            for row in trace[alarm & ~before]
-        ]
-        self._detections += found
-        self._name()
-        return found
-
-    def _name(self) -> None:
-        """Name the fault in the evidence of the alarm while the record since it is short."""
-        if not self._detections:
-            return
-        state = self._monitor.state
-        since = float(state.t - state.t_alarm)
-        if since < NAMING_S[self._named] or self._named == len(NAMING_S) - 1:
-            return
-        self._named += 1
-        isolation = self._monitor.isolate()
-        if isolation is not None:
-            self._detections[-1]['text'] = isolation.text()
-            self._detections[-1]['cause'] = f'f{isolation.best.fault}'
-            self._detections[-1]['strength'] = isolation.best.strength
-
-    @property
-    def refused(self) -> dict[str, int]:
-        """Samples refused or thinned out."""
-        left = self._samples - self._accepted
-        return {'refused_or_thinned': left} if left else {}
-
-
 @dataclass(frozen=True)
 class Plan:
     """
@@ -198,11 +117,9 @@ class Plan:
     figures: Path | None = None
     bags: Path | None = None
 
-    def engine(self) -> Engine:
+    def chain(self) -> Chain:
         """Return estimator and detector in their first state."""
-        if self.mode == 'scada':
-            return Scada()
-        return Approximator(Settings.for_mode(self.mode, **self.settings))
+        return Chain(Settings.for_mode(self.mode, **self.settings))
 
 
 def replay(
@@ -229,7 +146,7 @@ def replay(
 def _replay(
     recording: Recording, plan: Plan, outcome: Outcome, progress: Callable[[int], None], stem: str
 ) -> None:
-    engine = plan.engine()
+    chain = plan.chain()
     zero = first = last = None
     flags = FlagWriter(plan.bags / f'{stem}_flags.mcap', recording) if plan.bags else None
     thinner = Thinner() if plan.figures else None
@@ -242,16 +159,18 @@ def _replay(
             if columns is None:
                 break
             stamp = columns['stamp']
+            if (stamp < 0).any():
+                raise BagError('has stamps that have rolled over: see verify', recording.name)
             if zero is None or first is None:
                 zero, first = origin(int(stamp[0])), int(stamp[0])
             last = int(stamp[-1])
-            detections, result = engine.take(columns, zero)
+            result = chain.take(columns)
             spent += time.perf_counter() - began
-            outcome.detections += detections
+            outcome.detections += [evidence(event, zero) for event in result.detections]
             outcome.samples += len(stamp)
-            if result is not None and flags:
+            if flags:
                 flags.write(result)
-            if result is not None and thinner:
+            if thinner:
                 thinner.add(columns, result)
             progress(len(stamp))
     finally:
@@ -261,8 +180,8 @@ def _replay(
         raise BagError('has no measurement: the topic is empty', recording.name)
     outcome.duration_s = (last - first) / NANO
     outcome.samples_per_s = outcome.samples / spent
-    outcome.refused = engine.refused
-    if thinner and plan.figures and plan.mode != 'scada':
+    outcome.refused = chain.refused
+    if thinner and plan.figures:
         _draw(thinner, recording, outcome, plan.figures / f'{stem}.png')
 
 
@@ -305,4 +224,4 @@ def warm_up(plans: Sequence[Plan]) -> None:
     columns: Columns = {name: np.array([0.5]) for name in names}
     kernels.warm_up()
     for plan in plans:
-        plan.engine().take({'stamp': np.array([1]), **columns}, 0)
+        plan.chain().take({'stamp': np.array([1]), **columns})

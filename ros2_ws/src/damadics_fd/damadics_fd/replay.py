@@ -16,9 +16,10 @@ from tqdm import tqdm
 
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.recording import Recording, find_recordings, parse_maps
+from damadics_fd.core.modes import MODES
 from damadics_fd.core.settings import Settings, SettingsError
-from damadics_fd.offline import MODES, Outcome, Plan, replay, warm_up
-from damadics_fd.replay_output import FORMATS, print_table, write_outcomes
+from damadics_fd.offline import Outcome, Plan, replay, warm_up
+from damadics_fd.replay_output import check_format, print_table, write_outcomes
 
 EXAMPLES = """examples:
   ros2 run damadics_fd replay bags/friction --mode paper --figures figures --out result.json
@@ -61,13 +62,8 @@ def arguments(args: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument('--inputs-only', action='store_true',
                         help='with --live: publish no results, for nodes that run')
     options = parser.parse_args(args)
-    if options.out and options.out.suffix not in FORMATS:
-        parser.error(f'--out {options.out}: the suffix must be one of {", ".join(FORMATS)}')
     if options.rate <= 0.0:
         parser.error('--rate must be positive')
-    if options.mode == 'scada' and (options.figures or options.bag or options.live):
-        parser.error('--figures, --bag and --live show the approximator: use mode paper or'
-                     ' monitor')
     return options
 
 
@@ -86,10 +82,6 @@ def settings_of(options: argparse.Namespace) -> dict[str, Any]:
             raise SettingsError([f'--set {text}: write NAME=VALUE'])
         values[name] = yaml.safe_load(value)
     values.pop('mode', None)
-    if options.mode == 'scada':
-        if values:
-            raise SettingsError(['mode scada has no settings'])
-        return {}
     Settings.for_mode(options.mode, **values)
     return values
 
@@ -116,6 +108,8 @@ def main(args: list[str] | None = None) -> int:
     """Run the command."""
     options = arguments(args)
     try:
+        if options.out:
+            check_format(options.out)
         settings = settings_of(options)
         recordings = find_recordings(
             options.bags, options.topic, parse_maps(options.map), options.actuator

@@ -6,6 +6,7 @@ import csv
 import json
 from collections.abc import Sequence
 from dataclasses import asdict
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +40,19 @@ def print_table(outcomes: Sequence[Outcome]) -> None:
         print('  '.join(cells).rstrip())
 
 
+def check_format(path: Path) -> None:
+    """
+    Refuse a file that could not be written, before the work is done.
+
+    :param path: file for the results.
+    :raises RuntimeError: where its suffix is none of `FORMATS`, or pyarrow is missing for Parquet.
+    """
+    if path.suffix not in FORMATS:
+        raise RuntimeError(f'--out {path}: the suffix must be one of {", ".join(FORMATS)}')
+    if path.suffix == '.parquet' and find_spec('pyarrow') is None:
+        raise RuntimeError(f'--out {path}: Parquet needs pyarrow: pip install pyarrow')
+
+
 def write_outcomes(outcomes: Sequence[Outcome], path: Path) -> None:
     """
     Write results to a file.
@@ -48,8 +62,9 @@ def write_outcomes(outcomes: Sequence[Outcome], path: Path) -> None:
 
     :param outcomes: what became of each recording.
     :param path: file; its suffix chooses the format.
-    :raises RuntimeError: where Parquet is asked for and pyarrow is not installed.
+    :raises RuntimeError: as `check_format`.
     """
+    check_format(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     if path.suffix == '.json':
         text = json.dumps([asdict(outcome) for outcome in outcomes], indent=1, allow_nan=False)
@@ -63,11 +78,9 @@ def write_outcomes(outcomes: Sequence[Outcome], path: Path) -> None:
             writer.writeheader()
             writer.writerows(rows)
         return
-    try:
-        import pyarrow
-        from pyarrow import parquet
-    except ImportError as error:
-        raise RuntimeError(f'{path}: Parquet needs pyarrow: pip install pyarrow') from error
+    import pyarrow
+    from pyarrow import parquet
+
     columns = {name: [row.get(name) for row in rows] for name in names}
     parquet.write_table(pyarrow.table(columns), path)
 

@@ -5,6 +5,7 @@
 import csv
 import json
 import re
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -166,6 +167,7 @@ def test_shared_recordings_are_replayed(name, tmp_path):
 @pytest.mark.parametrize(('args', 'reason'), [
     (['nowhere.mcap'], 'does not exist'),
     (['x.csv'], 'lacks a time, a control value or a position'),
+    (['x.csv', '--out', 'x.xls'], 'the suffix must be one of'),
     (['x.csv', '--map', 'cv'], 'write SIGNAL='),
     (['x.csv', '--map', 'cv=none'], 'there is no such column'),
     (['x.csv', '--set', 'k1=-1', '--set', 'bogus=2'], r'bogus: no such setting.*k1 = -1'),
@@ -178,6 +180,22 @@ def test_errors_are_one_line_on_stderr(args, reason, tmp_path, capsys, monkeypat
     assert error.startswith('replay: ')
     assert error.count('\n') == 1
     assert re.search(reason, error)
+
+
+@needs_messages
+def test_parquet_is_written_or_refused_at_once(tmp_path, capsys):
+    write_columns(tmp_path / 'a.mcap', stroke(2000))
+    out = tmp_path / 'a.parquet'
+    code = main([str(tmp_path / 'a.mcap'), '--mode', 'paper', '--out', str(out)])
+    if find_spec('pyarrow') is None:
+        assert code == 1
+        assert 'pip install pyarrow' in capsys.readouterr().err
+    else:
+        from pyarrow import parquet
+
+        table = parquet.read_table(out)
+        assert table.num_rows > 0
+        assert set(table.column('mode').to_pylist()) == {'paper'}
 
 
 def test_maps_name_signal_source_and_factor():
