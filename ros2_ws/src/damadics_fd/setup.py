@@ -23,6 +23,7 @@ setup(
         'test': ['pytest', 'hypothesis'],
         'evaluate': ['jinja2', 'matplotlib', 'river', 'filterpy', 'scikit-learn'],
         'cluster': ['dask[distributed]'],
+        'parquet': ['pyarrow'],
     },
     entry_points={
         'console_scripts': [
