@@ -74,7 +74,8 @@ class Simulator:
         self._lay_out_faults()
         names = ('cv', 'p1', 'p2', 't1')
         self._sources: list[Source] = [
-            _fresh(getattr(self.scenario, name), seed) for name in names
+            _fresh(getattr(self.scenario, name), seed + 7919 * i)  # no two inputs alike
+            for i, name in enumerate(names)
         ]
         self._loop = self._sources[0] if isinstance(self._sources[0], LevelLoop) else None
         self._inflow = 0.0  # sum over the ticks of the loop's present period [kg/s]

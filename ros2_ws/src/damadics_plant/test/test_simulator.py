@@ -73,6 +73,11 @@ def test_seed_decides_the_noise():
     assert not np.array_equal(runs[0].x1, runs[2].x1)
 
 
+def test_two_random_inputs_differ():
+    run = simulate(Scenario('test', 60, cv=RandomSteps(), t1=RandomSteps()), rate=1)
+    assert not np.array_equal(run.cv, run.t1)
+
+
 @pytest.mark.parametrize(('model', 'values'), [
     ('dablib', [0.04875771072716806, 0.23100571226817979, 3489386.3531229743, 162129.902315901]),
     ('lugre', [0.04875771072716806, 0.2486307297231431, 3495982.5781912585, 173515.0544567246]),
