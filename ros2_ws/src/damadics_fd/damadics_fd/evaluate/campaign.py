@@ -38,6 +38,7 @@ MARGIN = 1.1  # limit of a calibrated detector over its largest value on nominal
 CALIBRATION_SEED = 1_000_100
 NOMINAL_SEED = 2_000_000
 ISOLATE_AFTER = (60, 300)  # s after the alarm
+SETTLED_AFTER = 600.0  # s after the alarm, the diagnosis that is judged
 LATE_ISOLATIONS = 1  # in equal parts of what is left of the run
 LIBRARIES = ('numpy', 'numba', 'river', 'filterpy', 'scikit-learn')
 
@@ -234,10 +235,11 @@ def isolation_result(
     named = [d['candidates'] for d in diagnoses]
     dacc_tm, dacc = diagnosis_accuracy(named, scenario.fault)
     twins = decision_indices(t, primary, scenario.zones, strength).as_isolation()
+    settled = [d for d in diagnoses if d['t'] <= alarm + SETTLED_AFTER][-1]
     return {
         'diagnoses': diagnoses,
-        'right_group': diagnoses[-1]['group'] == group_of(scenario.fault),
-        'right_first': diagnoses[-1]['ranking'][0][0] == scenario.fault,
+        'right_group': settled['group'] == group_of(scenario.fault),
+        'right_first': settled['ranking'][0][0] == scenario.fault,
         'indices': _plain({
             **twins, 'r_mi': misisolation_rate(t, complementary, scenario.zones),
             'dacc_tm': dacc_tm, 'dacc': dacc,

@@ -19,6 +19,7 @@ examples:
   evaluate run --out results --seeds 20 --nominal-days 40     more of it; what is there is kept
   evaluate run --out results --scenarios f4_I f11_B f12@-0.37 --detectors scada cusum
   evaluate run --out results --scheduler tcp://head:8786      on a Dask cluster
+  evaluate paper results                         the paper's two experiments, all detectors
   evaluate report results                        index.html, summary.csv, README.md in there
   evaluate compare before after                  what a change did, per scenario and detector
 
@@ -64,6 +65,8 @@ def _parser() -> argparse.ArgumentParser:
     report = commands.add_parser('report', help='write the report of a campaign')
     report.add_argument('directory', type=Path)
     report.add_argument('--to', type=Path, help='directory of the report (that of the campaign)')
+    paper = commands.add_parser('paper', help="add the paper's experiments to a campaign")
+    paper.add_argument('directory', type=Path)
     versus = commands.add_parser('compare', help='compare two campaigns')
     versus.add_argument('a', type=Path)
     versus.add_argument('b', type=Path)
@@ -80,7 +83,8 @@ def main(argv: list[str] | None = None) -> int:
     """
     arguments = _parser().parse_args(argv)
     try:
-        {'run': _run, 'report': _report, 'compare': _compare}[arguments.command](arguments)
+        commands = {'run': _run, 'report': _report, 'compare': _compare, 'paper': _paper}
+        commands[arguments.command](arguments)
     except (ValueError, OSError, MissingPackageError, ImportError) as error:
         print(f'evaluate: {error}', file=sys.stderr)
         return 1
@@ -105,6 +109,12 @@ def _run(arguments: argparse.Namespace) -> None:
     print(f'{len(results)} results in {arguments.out}')
     if not arguments.no_report:
         _write_report(arguments.out, arguments.out)
+
+
+def _paper(arguments: argparse.Namespace) -> None:
+    from damadics_fd.evaluate.paper import write_paper
+
+    print(write_paper(arguments.directory))
 
 
 def _report(arguments: argparse.Namespace) -> None:

@@ -120,10 +120,14 @@ def group_of(fault: int) -> str:
 
 @jit
 def _stem_error(
-    window: np.ndarray, act: Any, fault: Any, stem: Any
+    window: np.ndarray, act: Any, fault: Any, stem: Any, late: bool
 ) -> Any:
     """Return the mean squared error of X' under a fault that is present in the whole window."""
     copy_stem(window[0].stem, stem)
+    if late:  # the fault has been there for long: start from the position it has led to
+        stem.X = window[0].x / (1.0 + 1.25 * fault.f13) * act.stroke
+        stem.x += stem.X - window[0].stem.X
+        stem.feedback = stem.X
     total = 0.0
     for i in range(window.shape[0]):
         e = window[i]
@@ -174,6 +178,7 @@ class Isolator:
         self._stem = np.zeros(1, STEM)
         tests = [test.residual for test in TESTS]
         self._nominal = (math.nan, math.nan)
+        self._late = False
         self._variance = (
             float(reference['s1']) ** 2,
             float(reference['sd'][tests.index(R2)]) ** 2 or 1.0,
@@ -222,6 +227,7 @@ class Isolator:
         order = np.arange(count - kept, count) % HISTORY_LENGTH
         window = state['history'][order]
         window = window[window['t'] > state['t_onset']]
+        self._late = len(window) > WINDOW
         return np.ascontiguousarray(window[-WINDOW:])
 
     def _inputs(self, state: Any, window: NDArray) -> list[Hypothesis]:
@@ -249,7 +255,7 @@ class Isolator:
         nominal = np.zeros(1, FAULTS)
         if stem is not None or flow is None:
             faults = nominal if stem is None else stem
-            of_stem = _stem_error(window, self._act, faults[0], self._stem[0])
+            of_stem = _stem_error(window, self._act, faults[0], self._stem[0], self._late)
         else:
             of_stem = self._nominal[0]
         if flow is not None or stem is None:
@@ -305,7 +311,7 @@ class Isolator:
         left, right = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
         at_left = self.cost(window, fault, left)
         at_right = self.cost(window, fault, right)
-        for _ in range(7):
+        for _ in range(8 if fault in STEM_FAULTS else 20):  # the flow's laws cost next to nothing
             best = min(best, (at_left, left), (at_right, right))
             if at_left < at_right:
                 high, right, at_right = right, left, at_left
