@@ -178,7 +178,7 @@ def delay_bars(rows: Sequence[dict[str, Any]]) -> str:
             gone = [i for i in range(len(y)) if i not in seen]
             axis.plot(x[gone], np.full(len(gone), 0.62), 'x', color=colour, ms=4)
         axis.set_yscale('log')
-        axis.set_ylim(0.5, 1e5)
+        axis.set_ylim(0.5, 1e6)  # room for the legend
         axis.set_xlim(-0.7, len(names) - 0.3)
         axis.set_xticks(range(len(names)), names, rotation=90, fontsize=7)
         axis.set_ylabel('median t_dt (s); x: not detected')

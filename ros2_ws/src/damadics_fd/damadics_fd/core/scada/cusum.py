@@ -20,6 +20,7 @@ class Cusum:
     :param block: length of the blocks whose means give sigma, samples (autocorrelation).
     :param clip: limit on |z|.
     :param margin: factor on Siegmund's limit.
+    :param wandering: the same where the inputs are not stationary; 0 switches the test off.
     """
 
     residual: int
@@ -27,6 +28,7 @@ class Cusum:
     block: int
     clip: float
     margin: float
+    wandering: float
 
     @property
     def name(self) -> str:
@@ -37,23 +39,24 @@ class Cusum:
 # The tests of r2 need hardly a margin: its sigma is predicted, its noise white and normal. r1
 # carries the pressures' noise through the plug force, which is neither. The margins were set on
 # fault-free days that no result is reported for.
+# Where the inputs wander, as on a real plant, so do the residuals: wider limits, no slowest tests.
 TESTS = (
-    Cusum(R1, 4.0, 1, NO_CLIP, 2.5),
-    Cusum(R1, 1.5, 1, NO_CLIP, 3.4),
-    Cusum(R1, 0.5, 5, 4.0, 1.8),
-    Cusum(R1, 0.15, 30, 4.0, 1.6),
-    Cusum(R1, 0.05, 30, 4.0, 1.6),
-    Cusum(R2, 4.0, 1, NO_CLIP, 1.0),
-    Cusum(R2, 1.5, 1, NO_CLIP, 1.15),
-    Cusum(R2, 0.5, 5, 4.0, 1.1),
-    Cusum(R2, 0.15, 30, 4.0, 1.1),
-    Cusum(R2, 0.05, 30, 4.0, 1.1),
-    Cusum(P1, 1.5, 5, NO_CLIP, 1.0),
-    Cusum(P1, 0.5, 30, 4.0, 1.3),
-    Cusum(P2, 1.5, 5, NO_CLIP, 1.0),
-    Cusum(P2, 0.5, 30, 4.0, 1.3),
-    Cusum(T1, 1.5, 1, NO_CLIP, 1.3),
-    Cusum(T1, 0.3, 10, 4.0, 1.3),
+    Cusum(R1, 4.0, 1, NO_CLIP, 2.5, 2.7),
+    Cusum(R1, 1.5, 1, NO_CLIP, 3.4, 3.4),
+    Cusum(R1, 0.5, 5, 4.0, 1.8, 2.3),
+    Cusum(R1, 0.15, 30, 4.0, 1.6, 4.5),
+    Cusum(R1, 0.05, 30, 4.0, 1.6, 0.0),
+    Cusum(R2, 4.0, 1, NO_CLIP, 1.0, 1.25),
+    Cusum(R2, 1.5, 1, NO_CLIP, 1.15, 1.15),
+    Cusum(R2, 0.5, 5, 4.0, 1.1, 1.1),
+    Cusum(R2, 0.15, 30, 4.0, 1.1, 1.1),
+    Cusum(R2, 0.05, 30, 4.0, 1.1, 0.0),
+    Cusum(P1, 1.5, 5, NO_CLIP, 1.0, 0.0),
+    Cusum(P1, 0.5, 30, 4.0, 1.3, 0.0),
+    Cusum(P2, 1.5, 5, NO_CLIP, 1.0, 0.0),
+    Cusum(P2, 0.5, 30, 4.0, 1.3, 0.0),
+    Cusum(T1, 1.5, 1, NO_CLIP, 1.3, 0.0),
+    Cusum(T1, 0.3, 10, 4.0, 1.3, 0.0),
 )
 FRICTION_TEST = len(TESTS)
 TEST_NAMES = (*(test.name for test in TESTS), 'friction LLR')

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damadics_fd.core.jit import jit
-from damadics_fd.core.scada.cusum import P1, R1, TESTS, siegmund_limit
+from damadics_fd.core.scada.cusum import R1, TESTS, siegmund_limit
 from damadics_fd.core.scada.pressure import learn_pressure
 from damadics_fd.core.scada.settings import ScadaSettings
 from damadics_fd.core.scada.step import (
@@ -27,9 +27,8 @@ Floats = NDArray[np.float64]
 DAY_S = 86400.0
 LONG_RECORD = 3000  # samples below which the tails of r1 are not known well enough
 JUMP_CLIP = 6.0  # a jump must then last for three samples
-JUMP_MARGIN = 2.7
 HEAD_ROOM = 1.3  # on the largest CUSUM of the learning record
-LLR_MARGIN = 1.6
+LLR_MARGINS = (1.6, 2.2)  # with stationary inputs, with wandering ones
 LLR_HEAD_ROOM = 2.0
 RIDGE = 1e-4
 STATIONARY = 1.3  # sigma of 30 s blocks over sigma of samples, above it an input wanders
@@ -149,8 +148,9 @@ def learn(samples: Floats, settings: ScadaSettings) -> NDArray:
     prediction = candidates[hold]
     ref['w'][:used], r1 = _bias(prediction.phi, x - prediction.xm, used)
     r2 = _flow_residual(ref, prediction, samples[window, 6])
-    _limits(ref, settings, r1, r2, samples[window])
-    _friction_limit(ref, settings, r1, prediction)
+    wandering = not all(_stationary(v) for v in samples[window, 3:6].T if not np.isnan(v).all())
+    _limits(ref, settings, r1, r2, samples[window], wandering)
+    _friction_limit(ref, settings, r1, prediction, wandering)
     return reference
 
 
@@ -197,27 +197,29 @@ def _flow_residual(ref: Any, prediction: Prediction, flow: Floats) -> Floats:
 
 
 def _limits(
-    ref: Any, settings: ScadaSettings, r1: Floats, r2: Floats, samples: Floats
+    ref: Any, settings: ScadaSettings, r1: Floats, r2: Floats, samples: Floats, wandering: bool
 ) -> None:
     """Set mu, sigma, allowance and limit of every CUSUM from the budget."""
     n = len(r1)
     arl = arl_per_test(settings)
     values = (r1, r2, samples[:, 3], samples[:, 4], samples[:, 5])
-    wandering = not all(_stationary(v) for v in values[P1:])
     for i, test in enumerate(TESTS):
         r = values[test.residual]
         r = r[~np.isnan(r)]
-        if r.size < 200 or (test.residual >= P1 and not _stationary(r)):
+        margin = test.wandering if wandering else test.margin
+        if r.size < 200 or not margin > 0.0:
             continue
         sd = max(block_sigma(r, 1), block_sigma(r, test.block))
+        if not sd > 0.0:  # an input without any noise: nothing to test
+            continue
         mu = r.mean()
         if test.k0 == 4.0:
             quantile = NormalDist().inv_cdf(1.0 - 0.25 / n)
             sd *= max(1.0, float(np.abs(r - mu).max()) / sd / quantile)
         k = test.k0 + (4.0 / math.sqrt(r.size) if test.block > 1 else 0.0)
-        clip, margin = test.clip, test.margin
+        clip = test.clip
         if (wandering or n < LONG_RECORD) and test.residual == R1 and test.k0 == 4.0:
-            clip, margin = JUMP_CLIP, JUMP_MARGIN
+            clip = JUMP_CLIP
         largest = cusum_maximum((r - mu) / sd, k, clip)
         ref['mu'][i], ref['sd'][i], ref['k'][i], ref['clip'][i] = mu, sd, k, clip
         ref['h'][i] = max(margin * siegmund_limit(k, arl), HEAD_ROOM * largest)
@@ -227,9 +229,7 @@ def _stationary(values: Floats) -> bool:
     """Tell whether an input has no slow component, so that its mean can be tested."""
     sigma = block_sigma(values, 1)
     blocks = values.size // 30
-    return bool(sigma > 0 and block_sigma(values, 30) < sigma * (
-        STATIONARY + 1.0 / math.sqrt(blocks)
-    ))  # fmt: skip
+    return bool(block_sigma(values, 30) <= sigma * (STATIONARY + 1.0 / math.sqrt(blocks)))
 
 
 def arl_per_test(settings: ScadaSettings) -> float:
@@ -239,7 +239,7 @@ def arl_per_test(settings: ScadaSettings) -> float:
 
 
 def _friction_limit(
-    ref: Any, settings: ScadaSettings, r1: Floats, prediction: Prediction
+    ref: Any, settings: ScadaSettings, r1: Floats, prediction: Prediction, wandering: bool
 ) -> None:
     s1 = float(r1.std())
     kap2 = max(1.0, (block_sigma(r1, 5) / s1) ** 2)
@@ -247,5 +247,6 @@ def _friction_limit(
     gain = ((r1 / s1) ** 2 - wide**2) / (2.0 * kap2)
     ref['s1'], ref['kap2'] = s1, kap2
     ref['llr_limit'] = max(
-        LLR_MARGIN * math.log(arl_per_test(settings)), LLR_HEAD_ROOM * _llr_maximum(gain)
+        LLR_MARGINS[wandering] * math.log(arl_per_test(settings)),
+        LLR_HEAD_ROOM * _llr_maximum(gain),
     )

@@ -94,7 +94,7 @@ class FirResidual(Deviation):
 class FixedThreshold(Deviation):
     """The deviation against one limit."""
 
-    name, title = 'fixed', 'fixed threshold on |CV-X|'
+    name, title = 'fixed', 'fixed threshold on abs(CV-X)'
 
     def _test(self, z: Floats) -> Floats:
         return np.abs(z)
@@ -151,7 +151,7 @@ class Glr(FirResidual):
 class SmartPositioner(Deviation):
     """Low-passed |CV - X| over its limit for a monitoring time, as in a smart positioner."""
 
-    name, title = 'positioner', 'smart positioner: low-passed |CV-X|'
+    name, title = 'positioner', 'smart positioner: low-passed abs(CV-X)'
 
     def __init__(self, filter_s: float = 10.0, monitoring_s: int = 10) -> None:
         self.filter_s = filter_s
