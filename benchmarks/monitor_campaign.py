@@ -99,7 +99,7 @@ def delays(rows: list[dict[str, Any]], start: float = 70.0) -> dict[str, Any]:
     return {'runs': len(rows), 'false_alarms': early, 'missed': len(rows) - len(found),
             'p10': round(float(low), 3), 'median': round(float(median), 3),
             'p90': round(float(high), 3), 'worst': max(found, default=None),
-            'not_armed_at_60s': sum(row['armed'] is None or row['armed'] > 60.01 for row in rows)}
+            'not_armed_at_60s': sum(row['armed'] is None or row['armed'] > 60.1 for row in rows)}
 
 
 def quiet(rows: list[dict[str, Any]]) -> dict[str, Any]:
@@ -107,7 +107,7 @@ def quiet(rows: list[dict[str, Any]]) -> dict[str, Any]:
     ratio = [row['ratio'] for row in rows]
     return {'runs': len(rows), 'false_alarms': sum(bool(row['alarms']) for row in rows),
             'refused_to_arm': sum(row['refusals'] > 0 for row in rows),
-            'not_armed_at_60s': sum(row['armed'] is None or row['armed'] > 60.01 for row in rows),
+            'not_armed_at_60s': sum(row['armed'] is None or row['armed'] > 60.1 for row in rows),
             'largest_ratio_median': round(float(np.median(ratio)), 3),
             'largest_ratio_max': round(float(np.max(ratio)), 3)}
 
@@ -296,11 +296,12 @@ def slow(runs: int, workers: int) -> dict[str, Any]:
                'x1': np.abs(x - 1.0), 'p1': 3.5e6 + 2e5 * rng.standard_normal(n),
                'p2': np.full(n, 2.6e6), 'ps': rng.uniform(0.0, 3e5, n)}
     result = run(columns, APPROXIMATOR)
-    finite = all(np.isfinite(result.estimates[name]).all() for name in ('xi1', 'xi2', 'phi', 'x2'))
+    good = result.estimates[result.accepted]  # the noise takes some p1 out of range
+    finite = all(np.isfinite(good[name]).all() for name in ('xi1', 'xi2', 'phi', 'x2'))
     norm = np.sqrt(sum(np.sum(result.estimator.state[name]**2)
                        for name in ('w1', 'w2', 'eps1', 'b1')))
     return {'samples': n, 'accepted': result.counters['accepted'], 'finite': bool(finite),
-            'weights': float(norm), 'largest_xi2': float(np.abs(result.estimates['xi2']).max())}
+            'weights': float(norm), 'largest_xi2': float(np.abs(good['xi2']).max())}
 
 
 STUDIES = {function.__name__: function
