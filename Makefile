@@ -9,7 +9,7 @@ BUILT := ros2_ws/install/.built
 SOURCES := $(shell find ros2_ws/src -type f -not -name '*.pyc' -not -path '*/__pycache__/*' \
 	-not -path '*/test/*' -not -path '*/.pytest_cache/*')
 
-.PHONY: help demo dashboard test report build env lint clean
+.PHONY: help demo dashboard test report campaign-monitor build env lint clean
 
 help: ## show what can be made
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 18
@@ -27,6 +27,9 @@ report: $(BUILT) ## the benchmark's 44 scenarios x all detectors: docs/results/ 
 	@$(ENV) && ros2 run damadics_fd evaluate run --out results/campaign --seeds $(SEEDS) --no-report \
 		&& ros2 run damadics_fd evaluate paper results/campaign \
 		&& ros2 run damadics_fd evaluate report results/campaign --to docs/results
+
+campaign-monitor: $(BUILT) ## false alarms, delays, masking, sample rates of mode monitor (an hour)
+	@$(ENV) && python benchmarks/monitor_campaign.py $(ARGS)
 
 build: $(BUILT) ## set up .venv and build the ROS 2 workspace
 
