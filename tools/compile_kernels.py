@@ -2,26 +2,48 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compile the hot loops into numba's cache, so that nodes start at once after a build."""
 
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+
 import numpy as np
-from damadics_fd.bag import kernels
-from damadics_fd.core.detector import Detector
-from damadics_fd.core.estimator import Estimator
-from damadics_fd.core.pipeline import run
-from damadics_fd.core.scada.monitor import ScadaMonitor
-from damadics_fd.core.settings import Settings
-from damadics_plant import simulate
 
-SAMPLE = (0.5, 0.5, 3.5e6, 2.6e6, 20.0, 5.0, 1e5)
+SAMPLE = {'cv': 0.5, 'x1': 0.5, 'p1': 3.5e6, 'p2': 2.6e6, 't1': 20.0, 'flow': 5.0, 'ps': 1e5}
 
-settings = Settings.for_mode('paper')
-estimate = Estimator(settings).update(1, *SAMPLE)
-Detector(settings).update(estimate)
-names = ('cv', 'x1', 'p1', 'p2', 't1', 'flow', 'ps')
-columns = {name: np.array([value]) for name, value in zip(names, SAMPLE, strict=True)}
-run({'stamp': np.array([1]), **columns}, settings)
-kernels.warm_up()
-for model in ('dablib', 'lugre'):
-    simulate('nominal', model=model, duration=0.0)
-monitor = ScadaMonitor()
-monitor.run(simulate('f11@0.5', rate=1.0, duration=960.0))
-monitor.isolate()
+
+def detector() -> None:
+    """Compile what judges an estimate; the longest of all."""
+    from damadics_fd.core.detector import Detector
+    from damadics_fd.core.estimator import Estimate
+    from damadics_fd.core.settings import Settings
+
+    fields = len(Estimate._fields)
+    Detector(Settings.for_mode('paper')).update(Estimate._make([1, *[0.0] * (fields - 2), 0]))
+
+
+def the_others() -> None:
+    """Compile estimator, reader of bags and plant."""
+    from damadics_fd.bag import kernels
+    from damadics_fd.core.estimator import Estimator
+    from damadics_fd.core.settings import Settings
+    from damadics_plant import simulate
+
+    Estimator(Settings.for_mode('paper')).update(1, *SAMPLE.values())
+    kernels.warm_up()
+    for model in ('dablib', 'lugre'):
+        simulate('nominal', model=model, duration=0.0)
+
+
+def pipeline() -> None:
+    """Compile the loop over columns, which is made of the steps above."""
+    from damadics_fd.core.pipeline import run
+    from damadics_fd.core.settings import Settings
+
+    columns = {name: np.array([value]) for name, value in SAMPLE.items()}
+    run({'stamp': np.array([1]), **columns}, Settings.for_mode('paper'))
+
+
+if __name__ == '__main__':
+    with ProcessPoolExecutor(2, mp_context=get_context('spawn')) as pool:
+        for done in [pool.submit(detector), pool.submit(the_others)]:
+            done.result()
+    pipeline()
