@@ -5,13 +5,15 @@
 import math
 import string
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
 import yaml
 
+from damadics_fd.core.alarm import NORMAL
+from damadics_fd.core.events import Event
 from damadics_fd.core.signature_types import CAUSES
 from damadics_fd.trends import QUANTITIES
 
@@ -172,3 +174,21 @@ def _template_problem(text: Any) -> str:
     except (ValueError, IndexError, KeyError) as error:
         return str(error)
     return ''
+
+
+def explain(event: Event, table: CauseTable, tag: str) -> Event:
+    """
+    Word an event by the table once the signature has a cause for it.
+
+    :param event: a transition of the alarm.
+    :param table: texts.
+    :param tag: of the actuator.
+    :return: the event with text, advice and NE 107 class of its cause; a change that is too
+        small for maintenance keeps the class "normal".
+    """
+    if event.cause in ('', 'none'):
+        return event
+    cause = table[event.cause]
+    text, advice = cause.describe(tag, event.strength, event.spread, event.confidence)
+    level = cause.ne107 if event.level != NORMAL else NORMAL
+    return replace(event, text=f'{text}; {event.text}', advice=advice, level=level)

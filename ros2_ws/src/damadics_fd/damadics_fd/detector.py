@@ -11,6 +11,7 @@ from damadics_msgs.msg import FaultEvent, FaultFlag, Float64Stamped
 from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 
+from damadics_fd.advice import explain
 from damadics_fd.core.alarm import NE107
 from damadics_fd.core.detector import Decision, Detector, Outcome
 from damadics_fd.core.estimator import Estimate
@@ -21,6 +22,7 @@ from damadics_fd.ros.diagnostics import Level, Report
 from damadics_fd.ros.managed import MonitoringNode
 from damadics_fd.ros.operator import OperatorServices
 from damadics_fd.ros.rival import RivalWatch
+from damadics_fd.ros.signature import SignaturePublisher, read_causes
 from damadics_fd.ros.spin import spin
 
 HEARTBEAT = 1.0  # s of wall time
@@ -46,6 +48,8 @@ class DetectorNode(MonitoringNode):
         self._fault_flag = self.create_publisher(FaultFlag, 'fault_flag', qos.FLAG)
         self._fault_event = self.create_publisher(FaultEvent, 'fault_event', qos.EVENTS)
         self._rival = RivalWatch(self, self.refuse)
+        self._signature = SignaturePublisher(self, self._core.signature, self.actuator,
+                                             self.settings, self._signature_folder)
         OperatorServices(self, self._core, self._operated)
         self._was_silent = True
         self.start()
@@ -62,6 +66,11 @@ class DetectorNode(MonitoringNode):
             'alarm_folder', 'auto', 'folder that keeps the alarms over a restart; "auto": one of '
             'the user, in mode paper none; "": none',
         )
+        self._causes = read_causes(self.parameters.declare(
+            'causes_file', '', 'YAML file with texts and advice per cause; "": those of the package'
+        ))
+        self._signature_folder = self.parameters.declare(
+            'signature_folder', '', 'folder that keeps signature and trends over a restart; "": none')
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Begin afresh, with the alarms from before where they are kept."""
@@ -76,6 +85,7 @@ class DetectorNode(MonitoringNode):
                 self.get_logger().info(f'alarms of before taken up from {self._store.path}')
         except ValueError as problem:
             self.get_logger().error(f'alarms of before are lost: {problem}')
+        self._signature.restore()
         return super().on_configure(state)
 
     def _make_store(self) -> AlarmStore | None:
@@ -111,11 +121,12 @@ class DetectorNode(MonitoringNode):
             self.diagnostics.check()
         if decision.events:
             self._tell(decision.events, header.frame_id)
+        self._signature.update(header, decision.stamp)
 
     def _tell(self, events: Any, frame_id: str, more: str = '') -> None:
         """Publish transitions, and keep the alarm for a restart."""
         for event in events:
-            message = event_message(event, frame_id)
+            message = event_message(explain(event, self._causes, self.actuator), frame_id)
             message.text += more
             self._fault_event.publish(message)
         if self._store:

@@ -16,17 +16,22 @@ from damadics_fd.bag.decoder import Columns
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.flags import FlagWriter
 from damadics_fd.bag.recording import Recording, origin
+from damadics_fd.core.alarm import RAISED
 from damadics_fd.core.detector import Detector
 from damadics_fd.core.events import Event
 from damadics_fd.core.pipeline import Result, run
 from damadics_fd.core.quality import REASONS
 from damadics_fd.core.scada.estimator import estimator_for
 from damadics_fd.core.settings import Settings
+from damadics_fd.core.signature import Signature
+from damadics_fd.core.signature_types import STATE_VERIFY
+from damadics_fd.signature_figure import ForceMap, force_over_position
 from damadics_fd.thinning import Thinner
 
 NANO = 1e9
 NAMING_S = (30.0, 300.0, np.inf)  # after an alarm; a later fault must not change the name
 STRIDE = 120  # rows between two attempts of mode scada to name a fault
+JUDGEMENT = ('cause', 'confidence', 'strength', 'spread')
 PIECE = 8192  # rows judged at once: they fit the cache, and calls cost nothing against them
 
 
@@ -74,6 +79,11 @@ class Chain:
         return run(columns, self._settings, self._estimator, self._detector)
 
     @property
+    def signature(self) -> Signature:
+        """The valve signature."""
+        return self._detector.signature
+
+    @property
     def refused(self) -> dict[str, int]:
         """Samples that the estimator refused, by reason."""
         counters = self._estimator.counters
@@ -93,12 +103,24 @@ def evidence(event: Event, zero: int) -> dict[str, Any]:
         'onset': (event.onset - zero) / NANO if event.onset else None,
         'cause': event.cause,
         'confidence': event.confidence,
+        'strength': event.strength,
+        'spread': event.spread,
         'text': event.text,
     }
     return {
         name: None if isinstance(value, float) and not math.isfinite(value) else value
         for name, value in values.items()
     }
+
+
+def collect(detections: list[dict[str, Any]], events: Iterable[Event], zero: int) -> None:
+    """Add new detections; a cause that becomes known later is put into its detection."""
+    for event in events:
+        if event.transition == RAISED:
+            detections.append(evidence(event, zero))
+        elif event.cause and detections and detections[-1]['occurrence'] == event.occurrence:
+            present = evidence(event, zero)
+            detections[-1] |= {name: present[name] for name in JUDGEMENT}
 
 
 @dataclass(frozen=True)
@@ -150,6 +172,7 @@ def _replay(
     zero = first = last = None
     flags = FlagWriter(plan.bags / f'{stem}_flags.mcap', recording) if plan.bags else None
     thinner = Thinner() if plan.figures else None
+    forces = ForceMap(chain.signature) if plan.figures and plan.mode == 'monitor' else None
     spent = 0.0
     pieces = joined(recording.chunks(outcome.problems.append))
     try:
@@ -166,12 +189,14 @@ def _replay(
             last = int(stamp[-1])
             result = chain.take(columns)
             spent += time.perf_counter() - began
-            outcome.detections += [evidence(event, zero) for event in result.detections]
+            collect(outcome.detections, result.events, zero)
             outcome.samples += len(stamp)
             if flags:
                 flags.write(result)
             if thinner:
                 thinner.add(columns, result)
+            if forces:
+                forces.add(result.estimates[result.accepted])
             progress(len(stamp))
     finally:
         if flags:
@@ -183,6 +208,9 @@ def _replay(
     outcome.refused = chain.refused
     if thinner and plan.figures:
         _draw(thinner, recording, outcome, plan.figures / f'{stem}.png')
+    if forces and plan.figures and chain.signature.view().state >= STATE_VERIFY:
+        force_over_position(forces, chain.signature, plan.figures / f'{stem}_signature.png',
+                            Path(recording.name).name)
 
 
 def joined(pieces: Iterable[Columns]) -> Iterator[Columns]:

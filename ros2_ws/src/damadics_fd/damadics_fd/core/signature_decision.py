@@ -163,13 +163,13 @@ def watch(s: Any, c: Any) -> None:
         s.over[m] = s.over[m] + 1 if c.d_alarm < D else 0
         if m == SET_SLOW and joint_change(s, c, m):
             s.now_t = s.t
-        if s.over[m] >= c.n_alarm and s.state == STATE_MONITOR and own_alarm_allowed(s, c):
+        if s.over[m] >= c.n_alarm and s.state == STATE_MONITOR and own_alarm_ready(s, c):
             s.own = 1
             s.own_t = s.t
 
 
 @jit
-def own_alarm_allowed(s: Any, c: Any) -> bool:
+def own_alarm_ready(s: Any, c: Any) -> bool:
     """
     Tell whether the force model is good enough for an own alarm.
 

@@ -1,0 +1,137 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Publish the valve signature and keep its trends."""
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+from damadics_msgs.msg import Signature as SignatureMessage
+from rclpy.node import Node
+from std_msgs.msg import Header
+
+from damadics_fd.advice import CauseTable, CauseTableError, load_causes
+from damadics_fd.core.settings import Settings
+from damadics_fd.core.signature import Signature
+from damadics_fd.core.signature_decision import own_alarm_ready
+from damadics_fd.reference import Reference, load_reference, save_reference
+from damadics_fd.ros import qos
+from damadics_fd.ros.spin import StartError
+from damadics_fd.trends import TrendFile
+
+PERIOD = 1_000_000_000  # ns of measurement time between two messages without news
+
+
+def read_causes(path: str) -> CauseTable:
+    """
+    Read the table of causes that a node is given.
+
+    :param path: file of the user; empty for the table of the package.
+    :return: the table.
+    :raises StartError: naming everything that is wrong in it.
+    """
+    try:
+        return load_causes(Path(path) if path else None)
+    except (CauseTableError, OSError) as error:
+        raise StartError(f'causes_file: {error}') from error
+
+
+class SignaturePublisher:
+    """
+    Publisher of `signature`, about once a second of measurement time and on every change.
+
+    :param node: the detector.
+    :param signature: of its core.
+    :param actuator: tag; also names the files.
+    :param settings: that the signature was learned with.
+    :param folder: keeps the learned signature and its trends over a restart; empty for none.
+    """
+
+    def __init__(self, node: Node, signature: Signature, actuator: str, settings: Settings,
+                 folder: str = '') -> None:
+        self._node = node
+        self._signature = signature
+        self._actuator = actuator
+        self._settings = settings
+        self._folder = Path(folder).expanduser() if folder else None
+        self._trend: TrendFile | None = None
+        self._saved: dict[str, Any] = {}
+        self._last: tuple[int, ...] = ()
+        self._next = 0
+        self._publisher = node.create_publisher(SignatureMessage, 'signature', qos.FLAG)
+
+    def restore(self) -> None:
+        """Take up the signature of before, where there is a good one."""
+        if self._folder is None or self._settings.mode != 'monitor':
+            return
+        try:
+            kept = load_reference(self._path(self._folder), self._actuator, self._settings)
+            self._signature.load(kept.signature)
+            self._saved = kept.signature
+            self._node.get_logger().info(f'signature of before taken up from {self._folder}')
+        except ValueError as problem:
+            self._node.get_logger().info(f'the signature is learned anew: {problem}')
+
+    def update(self, header: Header, stamp: int) -> None:
+        """
+        Publish where there is news or a second is over.
+
+        :param header: of the measurement.
+        :param stamp: the same stamp [ns].
+        """
+        s = self._signature.state[0]
+        present = (int(s.state), int(s.family), int(s.cause))
+        if present == self._last and self._next - PERIOD <= stamp < self._next:
+            return
+        self._last, self._next = present, stamp + PERIOD
+        self._publisher.publish(signature_message(self._signature, header))
+        if self._folder and s.verified:
+            try:
+                self._keep(self._folder, stamp)
+            except OSError as problem:
+                self._node.get_logger().error(
+                    f'signature and trend are not kept: {problem}; check folder and free space',
+                    throttle_duration_sec=60.0)
+
+    def _keep(self, folder: Path, stamp: int) -> None:
+        s = self._signature.state[0]
+        if self._trend is None or s.theta.tolist() != self._saved.get('theta'):
+            saved = self._signature.save()
+            if saved != self._saved:
+                save_reference(self._path(folder), Reference(
+                    self._actuator, {}, self._settings.to_dict(), saved, source='live'))
+                self._saved = saved
+            name = hashlib.sha256(json.dumps(saved['theta']).encode()).hexdigest()[:16]
+            self._trend = TrendFile(folder, self._actuator, name)
+        if s.now_t:
+            self._trend.add(stamp, s.now.tolist(), s.now_std.tolist())
+
+    def _path(self, folder: Path) -> Path:
+        return folder / f'{self._actuator}.signature'
+
+
+def signature_message(signature: Signature, header: Header) -> SignatureMessage:
+    """
+    Return the state of the signature as a message.
+
+    :param signature: of the core.
+    :param header: of the measurement.
+    :return: the message.
+    """
+    s, view = signature.state[0], signature.view()
+    message = SignatureMessage(
+        header=header, state=view.state, family=view.family, cause=int(s.cause),
+        second=int(s.second) if s.cause == SignatureMessage.CAUSE_ELASTIC else 0,
+        own_alarm_ready=bool(own_alarm_ready(s, signature.record[0])),
+        progress=signature.progress, value=view.value, std=view.std, confidence=view.confidence,
+        d=float(s.D.max()), kappa=float(s.kappa), sigma=float(s.sigma),
+        stick_ratio=float(s.r_max / s.r_ref) if s.r_ref > 0.0 else 0.0,
+        theta=s.theta[:4].tolist(), change=s.now.tolist(), change_std=s.now_std.tolist(),
+        fill=float(s.air_rate[0]), vent=float(s.air_rate[1]),
+    )
+    if s.own:
+        message.source = SignatureMessage.SOURCE_OWN
+    elif s.state == SignatureMessage.STATE_ALARM:
+        message.source = SignatureMessage.SOURCE_APPROXIMATOR
+    return message
