@@ -67,10 +67,9 @@ class DetectorNode(MonitoringNode):
             'the user, in mode paper none; "": none',
         )
         self._causes = read_causes(self.parameters.declare(
-            'causes_file', '', 'YAML file with texts and advice per cause; "": those of the package'
-        ))
+            'causes_file', '', 'YAML file with texts and advice per cause; "": the own ones'))
         self._signature_folder = self.parameters.declare(
-            'signature_folder', '', 'folder that keeps signature and trends over a restart; "": none')
+            'signature_folder', '', 'folder that keeps signature and trends over a restart')
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Begin afresh, with the alarms from before where they are kept."""
