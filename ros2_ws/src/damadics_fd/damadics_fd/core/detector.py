@@ -93,8 +93,8 @@ def step(s: Any, c: Any, g: Any, gc: Any, e: Any, d: Any) -> None:
     ready = e.phase not in (PHASE_PAPER, PHASE_HOLD)
     signature.step(g, gc, e.stamp, e.x1, e.ps, e.dp, ready, s.active or s.latched)
     own = signature.own_level(g, gc)
-    d.transitions = alarm.step(s, c, e.stamp, armed or g.own != 0, exceed or own > 0, s.count[0] > 0,
-                               max(level, own), ratio)
+    d.transitions = alarm.step(s, c, e.stamp, armed or g.own != 0, exceed or own > 0,
+                               s.count[0] > 0, max(level, own), ratio)
     if g.cause != cause and s.active:
         d.transitions |= 1 << alarm.CHANGED
     d.residual = residual

@@ -45,6 +45,7 @@ NULL_MOVING = 12.0  # blocks since the alarm
 NULL_STICK = 1.5  # stick range / reference; a healthy valve reaches 1.44
 NULL_D = 15.0  # less evidence of the moving stem than this is none
 FLIP = 10  # evaluated blocks in a row that overturn a firm family
+P_LONG = 0.99  # names a family by the long record alone
 P_STICK = 0.96
 P_SUPPLY = 0.95
 STAGE2_EVIDENCE = 30.0
@@ -326,7 +327,17 @@ def second_stage(s: Any, c: Any) -> None:
     D = evaluate(s, c, m, c.model_error_stage2, 0.0, 0.0)
     if joint_change(s, c, m):
         s.now_t = s.t
-    if s.family != FAMILY_ELASTIC or c.d_decide >= D:
+    if c.d_decide >= D:
+        return
+    if s.family in (FAMILY_UNDETERMINED, FAMILY_UNCONFIRMED):
+        # too small a change for the shorter sets
+        p_f = math.exp(s.logp[m][FRICTION])
+        if p_f > P_LONG:
+            s.family = FAMILY_FRICTION
+            name_friction(s, m, p_f)
+        elif 1.0 - p_f > P_LONG:
+            s.family = FAMILY_ELASTIC
+    if s.family != FAMILY_ELASTIC:
         return
     best = SPRING
     total = 0.0
