@@ -3,8 +3,11 @@
 import math
 
 import pytest
-from damadics_fd.advice import CauseTableError, load_causes
+from damadics_fd.advice import CauseTableError, explain, load_causes
+from damadics_fd.core.alarm import CHANGED, NORMAL, OUT_OF_SPECIFICATION, RAISED
+from damadics_fd.core.events import Event
 from damadics_fd.core.signature_types import CAUSES
+from damadics_fd.offline import collect
 
 
 def test_every_cause_has_a_text_for_known_and_unknown_numbers():
@@ -56,3 +59,32 @@ def test_a_wrong_file_is_refused_with_every_error(tmp_path, content, complaints)
 
 def test_an_unknown_strength_reads_unknown():
     assert 'unknown' in load_causes()['supply'].describe('V', math.nan, math.nan, 0.9)[0]
+
+
+def event(transition: int, occurrence: int = 1, cause: str = '', level: int = 1, **values):
+    return Event(transition, 2_000_000_000, occurrence, level, 1_000_000_000, 1.0, 0.5, 2.0, 1.0,
+                 cause=cause, text='raised', **values)
+
+
+def test_an_event_is_worded_and_classed_by_its_cause():
+    table = load_causes()
+    plain = event(RAISED)
+    assert explain(plain, table, 'V') is plain
+    named = explain(event(CHANGED, cause='spring_softer', strength=-0.05, spread=0.001,
+                          confidence=0.99), table, 'V')
+    assert named.text == 'V: spring softer by -5.0% +- 0.2% (confidence 99%); raised'
+    assert named.level == OUT_OF_SPECIFICATION and 'crack' in named.advice
+    small = explain(event(CHANGED, cause='spring_softer', level=NORMAL), table, 'V')
+    assert small.level == NORMAL, 'a change too small for maintenance'
+
+
+def test_replay_puts_a_later_cause_into_its_detection():
+    found: list[dict] = []
+    collect(found, [event(RAISED, cause='undetermined')], 0)
+    collect(found, [event(CHANGED, cause='friction_up', strength=0.5, spread=0.02,
+                          confidence=0.99)], 0)
+    collect(found, [event(RAISED, 2)], 0)
+    collect(found, [event(CHANGED, 1, cause='supply')], 0)
+    assert [d['cause'] for d in found] == ['friction_up', '']
+    assert found[0]['strength'] == 0.5 and found[0]['spread'] == 0.02
+    assert found[0]['text'] == 'raised' and found[1]['strength'] is None
