@@ -14,7 +14,7 @@ setup(
         ('share/ament_index/resource_index/packages', ['resource/' + package]),
         ('share/' + package, ['package.xml']),
         ('share/' + package + '/launch', glob('launch/*.py')),
-        ('share/' + package + '/config', glob('config/*.yaml')),
+        ('share/' + package + '/config', glob('config/*')),
         ('share/' + package + '/layouts', glob('layouts/*')),
     ],
     install_requires=['setuptools'],

@@ -120,6 +120,10 @@ class Processes:
                 process.kill()
                 process.wait()
 
+    def forget(self, variable: str) -> None:
+        """Start further processes without a variable of the environment."""
+        self._environment.pop(variable, None)
+
     def start(self, package: str, name: str, arguments: Sequence[str] = (),
               label: str = '') -> None:
         """

@@ -4,6 +4,7 @@
 
 import argparse
 import os
+import signal
 import sys
 from pathlib import Path
 
@@ -74,7 +75,10 @@ def main(args: list[str] | None = None) -> int:
     try:
         token = read_token(options.token_file)
         check_binding(options.host, token)
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
         serve(options, token)
+    except KeyboardInterrupt:
+        return 0  # the server repeats the signal after its clean end
     except AccessError as problem:
         print(f'dashboard: {problem}', file=sys.stderr)
         return 1
@@ -98,6 +102,7 @@ def serve(options: argparse.Namespace, token: str) -> None:
     from damadics_dashboard.fleet_page import fleet_page, history_page
     from damadics_dashboard.frame import FAVICON
     from damadics_dashboard.history import History
+    from damadics_dashboard.replay_page import replay_page
     from damadics_dashboard.valve_page import valve_page
     from damadics_dashboard.watcher import Watcher
 
@@ -108,12 +113,15 @@ def serve(options: argparse.Namespace, token: str) -> None:
     ui.page('/')(lambda: fleet_page(watcher))
     ui.page('/history')(lambda: history_page(watcher))
 
+    ui.page('/replay')(lambda: replay_page(watcher))
+
     @ui.page('/valve/{name}')
     def valve(name: str) -> None:
         valve_page(watcher, name)
 
     app.on_startup(watcher.start)
     app.on_shutdown(watcher.stop)
+    app.on_shutdown(history.close)
     shown = f'[{options.host}]' if ':' in options.host else options.host
     app.on_startup(lambda: print(
         f'The dashboard is at http://{shown}:{options.port}' + ('/?token=...' if token else ''),
@@ -121,7 +129,7 @@ def serve(options: argparse.Namespace, token: str) -> None:
     ui.run(host=options.host, port=options.port, title='DAMADICS FD', favicon=FAVICON, dark=None,
            show=options.show, reload=False, show_welcome_message=False, language='en-US',
            tailwind=False, unocss=None, uvicorn_logging_level='warning', reconnect_timeout=10.0)
-    history.close()
+
 
 
 def _check_port(host: str, port: int) -> None:

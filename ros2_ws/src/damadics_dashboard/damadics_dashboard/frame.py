@@ -19,7 +19,7 @@ VALVE = (
 FAVICON = VALVE.replace('<svg ', '<svg xmlns="http://www.w3.org/2000/svg" ', 1).replace(
     'currentColor', '#0a64bd')
 VERSION = 1  # of the static files, for the caches of browsers
-PAGES = (('/', 'Fleet'), ('/history', 'History'))
+PAGES = (('/', 'Fleet'), ('/history', 'History'), ('/replay', 'Replay'))
 NEXT_THEME = {None: True, True: False, False: None}
 THEME = {None: ('brightness_auto', 'follow the system'), True: ('dark_mode', 'dark'),
          False: ('light_mode', 'light')}

@@ -42,7 +42,6 @@ def time_plot(names: list[str], unit: str, *, log: bool = False, low: float | No
         axis['max'] = high
     option: dict[str, Any] = {
         'animation': False,
-        'aria': {'enabled': True},
         'grid': {'left': 52, 'right': 14, 'top': 34, 'bottom': 52 if zoom else 24},
         'legend': {'top': 0, 'right': 6, 'itemWidth': 16, 'itemHeight': 8, 'icon': 'roundRect'},
         'tooltip': {'trigger': 'axis', 'axisPointer': {'type': 'line'}, 'confine': True},
@@ -66,16 +65,15 @@ def time_plot(names: list[str], unit: str, *, log: bool = False, low: float | No
     return option
 
 
-def signature_plot(names: tuple[str, str]) -> dict[str, Any]:
+def signature_plot(names: tuple[str, ...]) -> dict[str, Any]:
     """
     Return the options of the valve signature: force over position.
 
-    :param names: of the two clouds: before, now.
+    :param names: of the clouds, the fainter ones first.
     :return: ECharts options.
     """
     return {
         'animation': False,
-        'aria': {'enabled': True},
         'grid': {'left': 52, 'right': 16, 'top': 34, 'bottom': 40},
         'legend': {'top': 0, 'right': 6, 'itemWidth': 10, 'itemHeight': 10, 'icon': 'circle'},
         'tooltip': {'trigger': 'item', 'confine': True},
@@ -84,9 +82,9 @@ def signature_plot(names: tuple[str, str]) -> dict[str, Any]:
         'yAxis': {'type': 'value', 'name': 'input u [1]', 'nameTextStyle': {'align': 'left'},
                   'nameGap': 10, 'scale': True, 'splitNumber': 5},
         'series': [
-            {'type': 'scatter', 'name': name, 'data': [], 'symbolSize': size, 'large': True,
+            {'type': 'scatter', 'name': name, 'data': [], 'symbolSize': 4, 'large': True,
              'emphasis': {'disabled': True}, 'itemStyle': {'opacity': opacity}}
-            for name, size, opacity in ((names[0], 4, 0.55), (names[1], 4, 0.9))
+            for name, opacity in zip(names, (0.55, 0.9)[-len(names):], strict=True)
         ],
     }
 

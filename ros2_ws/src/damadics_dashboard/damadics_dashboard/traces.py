@@ -98,8 +98,8 @@ def envelope(stamp: NDArray[np.int64], value: NDArray[np.float64], width: int, *
     :param largest: only the greatest values, for what is compared with a limit from below.
     :return: points (time [s], value).
 
-    >>> envelope(np.arange(6) * 100_000_000, np.array([0.0, 5, 1, -1, 2, 3]), 300_000_000)
-    [[0.0, 0.0], [0.1, 5.0], [0.3, -1.0], [0.5, 3.0]]
+    >>> envelope(np.arange(6) * NANO, np.array([0.0, 5, 1, -1, 2, 3]), 3 * NANO)
+    [[0.0, 0.0], [1.0, 5.0], [3.0, -1.0], [5.0, 3.0]]
     """
     good = np.isfinite(value)
     stamp, value = stamp[good], value[good]

@@ -1,0 +1,162 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Launch files, parameter files, layouts, policy: what they name has to exist."""
+
+import argparse
+import importlib.util
+import json
+import os
+import re
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+
+import pytest
+import yaml
+from ament_index_python.packages import get_package_share_directory
+from damadics_bringup.fleet import TOPICS, FleetError, read_fleet
+from damadics_bringup.launcher import tasks_of
+from damadics_bringup.processes import executable, parameters
+from damadics_msgs import msg
+
+SHARE = Path(get_package_share_directory('damadics_bringup'))
+LAUNCH = sorted((SHARE / 'launch').glob('*.launch.py'))
+
+
+class Configuration:
+    """Stand-in of `LaunchConfiguration`."""
+
+    values: dict[str, str] = {}
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+    def perform(self, context) -> str:
+        return self.values[self.name]
+
+
+def described(path: Path, monkeypatch, **given: str) -> list:
+    """Run a launch file with stand-ins of `launch` that only remember."""
+    def remember(kind):
+        return lambda *args, **kwargs: SimpleNamespace(kind=kind, args=args, **kwargs)
+
+    modules = {
+        'launch': {'LaunchDescription': lambda actions: actions},
+        'launch.actions': {name: remember(name)
+                           for name in ('DeclareLaunchArgument', 'OpaqueFunction')},
+        'launch.conditions': {'IfCondition': remember('IfCondition')},
+        'launch.substitutions': {'LaunchConfiguration': Configuration},
+        'launch_ros': {},
+        'launch_ros.actions': {'Node': remember('Node')},
+    }
+    for name, content in modules.items():
+        module = ModuleType(name)
+        vars(module).update(content)
+        monkeypatch.setitem(sys.modules, name, module)
+    spec = importlib.util.spec_from_file_location(path.stem.replace('.', '_'), path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    actions = module.generate_launch_description()
+    Configuration.values = {
+        a.args[0]: getattr(a, 'default_value', '') for a in actions
+        if a.kind == 'DeclareLaunchArgument'
+    } | given
+    for action in list(actions):
+        if action.kind == 'OpaqueFunction':
+            actions += action.function(None)
+    return actions
+
+
+@pytest.mark.parametrize('path', LAUNCH, ids=lambda path: path.name)
+def test_a_launch_file_starts_what_there_is(path, monkeypatch):
+    actions = described(path, monkeypatch)
+    nodes = [action for action in actions if action.kind == 'Node']
+    assert {'estimator', 'detector'} <= {node.executable for node in nodes}
+    for node in nodes:
+        assert executable(node.package, node.executable)
+    declared = {a.args[0] for a in actions if a.kind == 'DeclareLaunchArgument'}
+    used = set(re.findall(r"LaunchConfiguration\('(\w+)'\)", path.read_text()))
+    assert used == declared
+
+
+def test_the_fleet_launch_file_and_the_run_command_start_the_same(monkeypatch):
+    valves = read_fleet(SHARE / 'config' / 'fleet.yaml')
+    launched = [
+        (node.namespace, node.package, node.executable)
+        for node in described(SHARE / 'launch' / 'fleet.launch.py', monkeypatch)
+        if node.kind == 'Node' and hasattr(node, 'namespace')
+    ]
+    options = argparse.Namespace(record=None, dashboard=False, simulate=True)
+    ran = [(t.label.split('/')[0], t.package, t.executable) for t in tasks_of(valves, options)]
+    assert sorted(launched) == sorted(ran)
+    assert len(ran) == 3 * len(valves)
+
+
+@pytest.mark.parametrize('name', ['estimator', 'detector'])
+def test_the_parameter_file_is_taken_by_the_node(name, tmp_path):
+    """A wrong parameter beside the file is the only complaint."""
+    wrong = [*parameters(no_such='x'), '--params-file', str(SHARE / 'config/valve.param.yaml')]
+    done = subprocess.run([executable('damadics_fd', name), *wrong], capture_output=True,
+                          text=True, timeout=60)
+    assert done.returncode == 1
+    complaints = [line for line in done.stderr.splitlines() if line.startswith('  ')]
+    assert complaints == ['  no_such: there is no such parameter']
+
+
+def test_all_mistakes_in_a_fleet_are_listed(tmp_path):
+    path = tmp_path / 'fleet.yaml'
+    path.write_text(yaml.safe_dump({'valves': {
+        'LV 1': {}, 'lv2': {'parameter': 'x'}, 'lv3': {'parameters': 'none.yaml'},
+        'lv4': {'topics': {'measurment': '/x'}}, 'lv5': {'settings': {'reference': 'r'}},
+        'lv6': {'settings': {'reference': 'r'}},
+    }}))
+    with pytest.raises(FleetError) as caught:
+        read_fleet(path)
+    for cause in ('LV 1: a name consists', 'lv2: there is no entry parameter',
+                  'none.yaml does not', 'lv4: there is no topic measurment',
+                  'lv6: lv5 has the reference r too'):
+        assert cause in str(caught.value)
+    for text in ('', 'valves: []', 'valves: {a: [1]}', ': :'):
+        path.write_text(text)
+        with pytest.raises(FleetError):
+            read_fleet(path)
+
+
+def fields(topic: str) -> set[str]:
+    kinds = {'measurement': msg.Measurement, 'estimate': msg.Estimate, 'residual':
+             msg.Float64Stamped, 'threshold': msg.Float64Stamped, 'fault_flag': msg.FaultFlag}
+    return set(kinds[topic].get_fields_and_field_types())
+
+
+def test_the_layouts_name_topics_and_fields_that_exist():
+    foxglove = (SHARE / 'layouts' / 'foxglove_valve.json').read_text()
+    json.loads(foxglove)
+    juggler = SHARE / 'layouts' / 'plotjuggler_valve.xml'
+    ET.parse(juggler)
+    named = re.findall(r'"/lv101/(\w+)\.(\w+)"', foxglove)
+    named += re.findall(r'(?:name|curve_x|curve_y)="/lv101/(\w+)/(\w+)"', juggler.read_text())
+    assert len(named) > 12
+    for topic, field in named:
+        assert field in fields(topic), f'{topic}.{field}'
+
+
+def test_the_policy_names_topics_that_exist():
+    tree = ET.parse(SHARE / 'config' / 'policy.xml')
+    allowed = {t.text.rsplit('/', 1)[-1] for t in tree.iter('topic')}
+    others = {'diagnostics', 'rosout', 'parameter_events', 'clock', 'transition_event'}
+    assert allowed - others <= set(TOPICS)
+    flag = [p.get('node') for p in tree.iter('profile')
+            for t in p.findall('topics[@publish]/topic') if t.text == 'fault_flag']
+    assert flag == ['detector'], 'nobody else may raise a flag'
+
+
+def test_without_keys_an_enforced_node_does_not_start(tmp_path):
+    enforced = {'ROS_SECURITY_ENABLE': 'true', 'ROS_SECURITY_STRATEGY': 'Enforce',
+                'ROS_SECURITY_KEYSTORE': str(tmp_path / 'none')}
+    done = subprocess.run(
+        [executable('damadics_fd', 'detector'), *parameters(mode='paper')],
+        env={**os.environ, **enforced}, capture_output=True, text=True, timeout=60)
+    assert done.returncode != 0
+    assert 'security' in done.stderr.lower() or 'keystore' in done.stderr.lower()
