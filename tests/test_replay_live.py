@@ -19,7 +19,7 @@ from rclpy.context import Context
 pytestmark = pytest.mark.ros
 GOLDEN = Path(__file__).parents[1] / 'bags'
 # what the monitor learns from is shortened, so that it decides within the test
-QUICK = {'t_on': 0.5, 't_w': 1.0, 't_learn': 2.0, 'travel_min': 0.01}
+QUICK = {'t_on': 0.5, 't_w': 1.0, 't_learn': 4.0, 'travel_min': 0.01}
 
 
 def excerpt(name: str, begin: float, end: float) -> dict[str, np.ndarray]:
@@ -33,10 +33,10 @@ def excerpt(name: str, begin: float, end: float) -> dict[str, np.ndarray]:
 
 @pytest.mark.parametrize(('mode', 'name', 'begin', 'speeds', 'changes'), [
     ('paper', 'dablib_spring', 66.0, (2, 8), {}),
-    ('monitor', 'lugre_spring', 66.0, (4,), QUICK),
+    ('monitor', 'lugre_spring', 64.0, (4,), QUICK),
 ])
 def test_live_and_offline_agree_bit_for_bit(tmp_path, mode, name, begin, speeds, changes):
-    columns = excerpt(name, begin, begin + 6.0)
+    columns = excerpt(name, begin, begin + 8.0)
     source = tmp_path / 'source.mcap'
     write_columns(source, columns)
     result = run(columns, Settings.for_mode(mode, **changes))
