@@ -57,8 +57,8 @@ def parser() -> argparse.ArgumentParser:
         'the same core off line.', epilog='Example: ros2 run damadics_bringup demo --factor 5')
     top.add_argument('--out', type=Path, default=Path('demo'), metavar='DIR',
                      help='folder for bags, figures and results.json (default: demo)')
-    top.add_argument('--factor', type=float, default=5.0,
-                     help='seconds of scenario per second of wall time (default: 5)')
+    top.add_argument('--factor', type=float, default=8.0,
+                     help='seconds of scenario per second of wall time (default: 8)')
     top.add_argument('--only', choices=[e.name for e in EXPERIMENTS],
                      help='do this experiment only')
     return top

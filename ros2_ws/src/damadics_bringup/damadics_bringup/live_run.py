@@ -9,6 +9,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import rclpy
+from damadics_fd.ros import qos
+from damadics_msgs.msg import FaultFlag
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException
 from rclpy.experimental import EventsExecutor
@@ -24,16 +26,16 @@ from damadics_bringup.processes import (
 )
 
 CHAIN = {  # the number of subscribers of each topic before the plant starts
-    '/estimate': 2, '/residual': 1, '/threshold': 1, '/fault_flag': 1, '/fault_event': 1,
+    '/estimate': 2, '/residual': 1, '/threshold': 1, '/fault_flag': 2, '/fault_event': 1,
 }
 PATIENCE = 30.0  # s for the processes to discover each other
-WRITING = 120.0  # s for a process to end: the recorder may have much to write
-QUIET = 1.0  # s without news from the detector after which the queues are empty
+WRITING = 120.0  # s for the queues to empty, and for the recorder to write what it has
+QUIET = 1.0  # s from the detector's last word to the end of the processes
 
 
 class Watcher:
     """
-    A node that sees the graph and the scenario's clock.
+    A node that sees the graph, the scenario's clock and the detector's flag.
 
     :param domain: ROS domain of the run.
     :param on_time: called with the scenario time [s].
@@ -46,6 +48,10 @@ class Watcher:
         self._executor = EventsExecutor(context=self._context)
         self._executor.add_node(self._node)
         self.time = 0.0
+        self.judged = 0.0  # scenario time of the detector's last word [s]
+
+        def heed(flag: FaultFlag) -> None:
+            self.judged = flag.header.stamp.sec + 1e-9 * flag.header.stamp.nanosec
 
         def take(message: Clock) -> None:
             self.time = message.clock.sec + 1e-9 * message.clock.nanosec
@@ -53,6 +59,7 @@ class Watcher:
 
         profile = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
         self._node.create_subscription(Clock, '/clock', take, profile)
+        self._node.create_subscription(FaultFlag, 'fault_flag', heed, qos.FLAG)
 
     def spin_until(self, condition: Callable[[], bool], patience: float) -> bool:
         """
@@ -120,6 +127,7 @@ def run(
             )
             watcher.spin_until(lambda: processes.ended('plant'), PATIENCE + 3600.0)
             processes.check()
+            watcher.spin_until(lambda: watcher.judged >= watcher.time, WRITING)
             watcher.spin_until(lambda: False, QUIET)
             for name in ('estimator', 'detector', 'recorder'):
                 processes.end(name, WRITING)
