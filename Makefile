@@ -21,7 +21,7 @@ dashboard: $(BUILT) ## a simulated valve and the web page at http://127.0.0.1:80
 	@$(ENV) && ros2 run damadics_bringup run --simulate --dashboard $(ARGS)
 
 test: $(BUILT) ## run all tests
-	@$(ENV) && python -m pytest -m 'not slow' -o pythonpath= $(ARGS)
+	@$(ENV) && python -m pytest -m 'not slow' -o pythonpath=tests $(ARGS)
 
 report: $(BUILT) ## the benchmark's 44 scenarios x all detectors: docs/results/ (minutes; more: SEEDS=20)
 	@$(ENV) && ros2 run damadics_fd evaluate run --out results/campaign --seeds $(SEEDS) --no-report \
