@@ -47,7 +47,9 @@ def write_report(source: Path, target: Path) -> list[Path]:
     paper = source / PAPER
     content['paper'] = json.loads(paper.read_text(encoding='utf-8')) if paper.exists() else None
     template = Path(__file__).with_name('report.html.j2').read_text(encoding='utf-8')
-    html = jinja2.Environment(undefined=jinja2.StrictUndefined).from_string(template)
+    environment = jinja2.Environment(undefined=jinja2.StrictUndefined)
+    environment.filters |= {'cell': _cell, 'share': _share}
+    html = environment.from_string(template)
     target.mkdir(parents=True, exist_ok=True)
     files = [target / name for name in ('index.html', 'summary.csv', 'README.md')]
     files[0].write_text(html.render(**content, versions=manifest['versions']), encoding='utf-8')
@@ -79,6 +81,7 @@ def _content(campaign: Campaign, results: Sequence[Result]) -> dict[str, Any]:
         'cards': cards(standard, false_alarms),
         'shortfalls': shortfalls(rows),
         'grid': _grid(standard, detectors),
+        'free': [r for r in rows if r['scenario'] not in SCENARIOS and r['detector'] == 'scada'],
         'false_alarms': false_alarms,
         'forms': _forms(results),
         'figures': {
@@ -153,9 +156,13 @@ def shortfalls(rows: Sequence[dict[str, Any]]) -> list[str]:
             lines.append(f'{name}: found after {_cell(r["t_dt_median"])} s, by the {rival[1]} '
                          f'after {_cell(rival[0])} s.')  # fmt: skip
         if r['detected'] and r['first_right'] < 1.0:
+            early = '' if case(name).abrupt else (
+                ', judged 600 s after the alarm: a fault that has only just become visible has '
+                'little shape'
+            )  # fmt: skip
             lines.append(
                 f'{name}: named right in {r["first_right"]:.0%} of the runs that alarm, '
-                f'its group in {r["group_right"]:.0%}.'
+                f'its group in {r["group_right"]:.0%}{early}.'
             )
     return lines
 
@@ -179,7 +186,8 @@ def _grid(rows: Sequence[dict[str, Any]], detectors: Sequence[str]) -> list[dict
             finite = math.isfinite(r['t_dt_median'])
             cells.append((text, 'best' if finite and r['t_dt_median'] <= min(present)
                           else '' if finite else 'miss'))  # fmt: skip
-        grid.append({'scenario': scenario, 'cells': cells})
+        runs = max(by[scenario, d]['runs'] for d in detectors if (scenario, d) in by)
+        grid.append({'scenario': scenario, 'runs': runs, 'cells': cells})
     return grid
 
 
@@ -202,6 +210,10 @@ def _forms(results: Sequence[Result]) -> list[dict[str, Any]]:
         title = NAMES.get(fault) or OTHER_NAMES[fault]
         forms.append({'fault': fault, 'name': title, 'scenarios': names, 'rows': rows})
     return forms
+
+
+def _share(value: float) -> str:
+    return '–' if math.isnan(value) else f'{value:.0%}'
 
 
 def _index(result: Result, name: str) -> float | None:
@@ -229,16 +241,24 @@ def _readme(content: dict[str, Any]) -> str:
         '## What is not detected or not isolated, and why', '',
         *(f'- {line}' for line in content['shortfalls']), '',
         '## Detection time, median t_dt in s', '',
-        '| scenario | ' + ' | '.join(content['titles'].values()) + ' |',
-        '|---|' + '---|' * len(content['titles']),
+        '| scenario | runs | ' + ' | '.join(content['titles'].values()) + ' |',
+        '|---|---|' + '---|' * len(content['titles']),
     ]  # fmt: skip
     for row in content['grid']:
         cells = (f'**{c[0]}**' if c[1] == 'best' else c[0] for c in row['cells'])
-        lines.append(f'| {row["scenario"]} | ' + ' | '.join(cells) + ' |')
+        lines.append(f'| {row["scenario"]} | {row["runs"]} | ' + ' | '.join(cells) + ' |')
     if content['paper']:
         lines += ['', "## The paper's experiments", '', content['paper']['text'], '',
                   '| detector | ' + ' | '.join(content['paper']['columns']) + ' |',
                   '|---|' + '---|' * len(content['paper']['columns'])]  # fmt: skip
         lines += ['| ' + ' | '.join(map(str, row)) + ' |' for row in content['paper']['rows']]
+    if content['free']:
+        lines += ['', '## Isolation at other strengths', '',
+                  '| fault@strength | runs | median t_dt | group right | fault first |',
+                  '|---|---|---|---|---|']  # fmt: skip
+        lines += [
+            f'| {r["scenario"]} | {r["runs"]} | {_cell(r["t_dt_median"])} | '
+            f'{_share(r["group_right"])} | {_share(r["first_right"])} |' for r in content['free']
+        ]  # fmt: skip
     lines += ['', 'Made by `evaluate report`; edit nothing here.', '']
     return '\n'.join(lines)

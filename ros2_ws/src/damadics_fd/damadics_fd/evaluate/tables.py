@@ -64,7 +64,8 @@ def summary(results: Sequence[Result]) -> list[dict[str, Any]]:
     rows = []
     order = {name: i for i, name in enumerate(SCENARIOS)}
     for (scenario, detector), group in sorted(
-        scenario_results(results).items(), key=lambda item: (order[item[0][0]], item[0][1])
+        scenario_results(results).items(),
+        key=lambda item: (order.get(item[0][0], len(order)), item[0]),
     ):
         t_dt = delays(group)
         found = [r['indices'] for r in group if r['indices']['t_dt'] is not None]
