@@ -74,7 +74,7 @@ def _content(campaign: Campaign, results: Sequence[Result]) -> dict[str, Any]:
         'titles': {d: plots.title_of(d) for d in detectors},
         'seeds': f'{min(campaign.seeds)} to {max(campaign.seeds)}',
         'calibration_days': campaign.calibration_days,
-        'nominal_days': campaign.nominal_days,
+        'nominal_days': max((r['days'] for r in false_alarms), default=0),
         'settings_hash': campaign.settings_hash('scada') if 'scada' in present else '',
         'summary': rows,
         'whole': all(r['detected'] in (0, r['runs']) for r in standard),
