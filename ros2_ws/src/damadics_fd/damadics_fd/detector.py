@@ -15,6 +15,7 @@ from damadics_fd.advice import explain
 from damadics_fd.core.alarm import NE107
 from damadics_fd.core.detector import Decision, Detector, Outcome
 from damadics_fd.core.estimator import Estimate
+from damadics_fd.core.modes import PHASE_INIT, PHASE_MONITOR
 from damadics_fd.ros import qos
 from damadics_fd.ros.alarm_store import AlarmStore, another_run, default_folder
 from damadics_fd.ros.conversions import event_message, read_estimate, write_flag
@@ -40,6 +41,7 @@ class DetectorNode(MonitoringNode):
         self._decision: Decision | None = None
         self._loaded: int | None = None  # stamp of the alarm state that was loaded
         self._twice = 0
+        self._phase = PHASE_INIT
         self._number = Float64Stamped()
         self._flag = FaultFlag()
         samples = qos.samples(self.settings.sample_rate)
@@ -107,6 +109,10 @@ class DetectorNode(MonitoringNode):
         elif before is not None and estimate.stamp == before.stamp:
             self._twice += 1  # two estimators send
             return
+        learns = self._phase == PHASE_MONITOR and estimate.phase < PHASE_MONITOR
+        if learns and not self._was_silent:
+            self._core.signature.relearn()  # somebody had the valve learned afresh
+        self._phase = estimate.phase
         decision = self._decision = self._core.update(estimate)
         header = message.header
         self._number.header = self._flag.header = header
