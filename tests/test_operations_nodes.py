@@ -170,9 +170,11 @@ def test_a_killed_detector_comes_back_with_its_alarm_and_raises_no_other(valve, 
         'damadics_fd', 'detector', parameters(alarm_folder=plant.alarms, **SETTINGS))
     assert valve.run_until(lambda: len(valve.flags) > before, patience=30.0)
     assert valve.flags[before].fault, 'the alarm was lost'
+    assert valve.run_until(
+        lambda: valve.flags[-1].state == FaultFlag.STATE_LATCHED, patience=30.0
+    ), 'the restarted detector does not judge'
     valve.run(2.0)
     assert valve.flags[-1].occurrence == occurrence, 'the restart raised an alarm'
-    assert valve.flags[-1].state == FaultFlag.STATE_LATCHED
     again = valve.call(Acknowledge, 'acknowledge')
     assert 'acknowledged before' in again.message
 
