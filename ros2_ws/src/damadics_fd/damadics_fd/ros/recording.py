@@ -78,7 +78,6 @@ class Recorder(Node):
         self._wanted = {self.resolve_topic_name(name) for name in topics}
         self._recorded: dict[str, Recorded] = {}
         self._refused: set[str] = set()
-        self._lost: dict[str, int] = {}
         self._now: Callable[[], int] = time.time_ns
         if self.get_parameter('use_sim_time').value:
             self._now = lambda: self.get_clock().now().nanoseconds
@@ -143,9 +142,9 @@ class Recorder(Node):
                 topic.offered_qos = [describe(info.qos_profile) for info in infos]
             put((topic, data, now()))
 
-        events = SubscriptionEventCallbacks(
-            message_lost=lambda event: self._lost.__setitem__(name, event.total_count)
-        )
+        # no event of the middleware, not even the default ones: taking one can block for ever
+        # in this executor while messages arrive (seen in rclpy 7.1.6, message_lost)
+        events = SubscriptionEventCallbacks(use_default_callbacks=False)
         subscription = self.create_subscription(
             message_type, name, receive, matching(reliable, latched), raw=True,
             event_callbacks=events,
@@ -153,9 +152,8 @@ class Recorder(Node):
         self._recorded[name] = Recorded(topic, subscription, reliable, latched)
 
     def _report(self) -> None:
-        """Publish what is recorded, lost and waiting."""
+        """Publish what is recorded, waiting and dropped."""
         spool, bag = self._spool, self._spool.bag
-        lost = sum(self._lost.values())
         status = DiagnosticStatus(
             name='recorder: bag', hardware_id=str(bag.path), level=DiagnosticStatus.OK,
             message='recording',
@@ -163,11 +161,11 @@ class Recorder(Node):
         if spool.error or spool.dropped:
             status.level = DiagnosticStatus.ERROR
             status.message = f'cannot write: {spool.error}' if spool.error else 'messages dropped'
-        elif lost or self._refused:
+        elif self._refused:
             status.level = DiagnosticStatus.WARN
-            status.message = 'messages lost' if lost else 'topics refused'
+            status.message = 'topics refused'
         values = {
-            'Size (B)': bag.size, 'Messages waiting': spool.waiting, 'Messages lost': lost,
+            'Size (B)': bag.size, 'Messages waiting': spool.waiting,
             'Messages dropped': spool.dropped, 'Free disk (B)': free_bytes(bag.path),
             'Topics refused': ' '.join(sorted(self._refused)),
             **{f'Messages on {name}': count for name, count in bag.counts.items()},
