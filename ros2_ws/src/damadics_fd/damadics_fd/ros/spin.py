@@ -36,29 +36,27 @@ def spin(make_node: Callable[[], SpinnableNode], args: list[str] | None = None) 
         node did not start, or what the node gives.
     """
     rclpy.init(args=args)
+    node = None
     try:
         node = make_node()
-    except StartError as problem:
-        print(problem, file=sys.stderr)
-        rclpy.try_shutdown()
-        return 1
-    except (KeyboardInterrupt, Exception) as problem:
-        if rclpy.ok() and not isinstance(problem, KeyboardInterrupt):
-            raise
-        rclpy.try_shutdown()
-        return 0  # a signal came while the node was starting
-    executor = EventsExecutor()
-    executor.add_node(node)
-    try:
+        executor = EventsExecutor()
+        executor.add_node(node)
         # Never untimed: an untimed spin of this executor does not return in some builds. Many
         # callbacks a call, where spin_once returns after each.
         never: Future = Future()
         while rclpy.ok() and not node.finished:
             executor.spin_until_future_complete(never, 0.1)
+    except StartError as problem:
+        print(problem, file=sys.stderr)
+        return 1
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
+    except Exception:
+        if rclpy.ok():
+            raise
+        # a signal has ended the context between two calls, or while the node was starting
     finally:
-        node.destroy_node()
-        executor.shutdown()
+        if node is not None:
+            node.destroy_node()
         rclpy.try_shutdown()
-    return node.exit_code
+    return node.exit_code if node is not None else 0
