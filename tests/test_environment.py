@@ -143,3 +143,28 @@ def test_setup_is_done_once_only():
         cwd=ROOT, env=clean, capture_output=True, text=True, timeout=60,
     )
     assert (done.returncode, done.stdout) == (0, ''), done.stderr
+
+
+@pytest.mark.parametrize('another', ['/opt/python/cp311-cp311', '/somebody/clone/.venv'])
+def test_setup_repairs_exported_paths_in_this_environment_only(tmp_path, monkeypatch, another):
+    monkeypatch.syspath_prepend(ROOT / 'tools')
+    import setup_env
+
+    exported = tmp_path / 'share' / 'std_msgs' / 'cmake' / 'std_msgsExport.cmake'
+    exported.parent.mkdir(parents=True)
+    before = (
+        f'INTERFACE_INCLUDE_DIRECTORIES "${{_IMPORT_PREFIX}}/include/std_msgs;'
+        f'{another}/include/python3.11;{another}/lib/site-packages/numpy/_core/include"\n'
+    )
+    cached = tmp_path / 'cache'
+    cached.write_text(before)
+    exported.hardlink_to(cached)
+    (tmp_path / 'bin').mkdir()
+    (tmp_path / 'bin' / 'python').symlink_to(ROOT / '.venv' / 'bin' / 'python')
+    monkeypatch.setattr(setup_env, 'VENV', tmp_path)
+    assert setup_env.repair_exported_paths() == 1
+    assert cached.read_text() == before, 'the cache is shared with other environments'
+    first, python, numpy = exported.read_text().split('"')[1].split(';')
+    assert first == '${_IMPORT_PREFIX}/include/std_msgs'
+    assert Path(python, 'Python.h').is_file()
+    assert Path(numpy, 'numpy', 'arrayobject.h').is_file()

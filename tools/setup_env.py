@@ -134,7 +134,10 @@ def install(files: list[Path], ros_installed: bool) -> None:
 
 def repair_exported_paths() -> int:
     """
-    Point the CMake files of the wheels to this Python's headers instead of the builder's.
+    Point the CMake files of the wheels to this Python's headers instead of another machine's.
+
+    Each file is replaced, not rewritten: uv links it to its cache, which other environments
+    share, so what was written into it would reach them too.
 
     :return: the number of files changed.
     """
@@ -145,12 +148,13 @@ def repair_exported_paths() -> int:
     )
     answer = subprocess.run([python, '-c', query], check=True, capture_output=True, text=True)
     include, numpy_include = answer.stdout.splitlines()
-    builders = r'/opt/python/cp\d+-cp\d+/[^";]*'
     changed = 0
     for path in VENV.glob('share/*/cmake/*Export.cmake'):
         text = path.read_text()
-        fixed = re.sub(builders, lambda m: numpy_include if 'numpy' in m[0] else include, text)
+        fixed = re.sub(r'/[^";]*/numpy/(?:_core|core)/include', lambda _: numpy_include, text)
+        fixed = re.sub(r'/[^";]*/include/python3\.\d+', lambda _: include, fixed)
         if fixed != text:
+            path.unlink()
             path.write_text(fixed)
             changed += 1
     return changed
