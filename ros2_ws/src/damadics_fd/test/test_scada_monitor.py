@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The SCADA-rate monitor on recorded data: genuine Simulink output and the real plant."""
 
+import dataclasses
 import math
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from damadics_fd.core.scada.learning import LearningError, cusum_maximum, learn
 from damadics_fd.core.scada.monitor import ScadaMonitor
 from damadics_fd.core.scada.settings import ScadaSettings
 from damadics_fd.evaluate.baselines.residuals import FirCusum
+from damadics_plant import Fault, load_scenario, simulate
 
 DATA = Path(__file__).resolve().parents[5] / 'shared' / 'data'
 T, CV, X, P1, P2, T1, F = range(7)
@@ -192,3 +194,30 @@ def test_cusum_maximum_by_hand():
     assert cusum_maximum(z, 0.5, 1e9) == pytest.approx(0.5 + 1.5 + 8.5)
     assert cusum_maximum(z, 0.5, 4.0) == pytest.approx(0.5 + 1.5 + 3.5)
     assert len(TEST_NAMES) == len(set(TEST_NAMES))
+
+
+class Stepped:
+    """The benchmark's sine for CV, with an operator's steps from 1000 s to 1600 s."""
+
+    def at(self, t):
+        sine = 0.5 + 0.25 * np.sin(2 * np.pi * 0.01 * t)
+        steps = np.where((t // 150) % 2 == 0, 0.8, 0.3)
+        return np.where((t >= 1000) & (t < 1600), steps, sine)
+
+
+@pytest.mark.parametrize(('fault', 'found'), [((), None), ((('f13', 0.25, 1200.0),), 1202.0),
+                                              ((('f1', 0.75, 1400.0),), 1500.0)])
+def test_an_unlearned_step_of_cv_is_no_fault_and_hides_none_for_long(fault, found):
+    scenario = dataclasses.replace(
+        load_scenario('nominal'), duration=2100.0, cv=Stepped(),
+        faults=tuple(Fault(*f) for f in fault),
+    )
+    run = simulate(scenario, rate=1, noise='cv', seed=5)
+    columns = {name: getattr(run, name) for name in ('cv', 'x1', 'p1', 'p2', 't1', 'flow')}
+    trace = ScadaMonitor(QUARTER).run({'stamp': np.rint(run.t * 1e9).astype(int), **columns})
+    alarms = trace['t'][trace['alarm']]
+    if found is None:
+        assert not len(alarms)
+        assert trace['ratio'].max() < 0.9
+    else:
+        assert fault[0][2] <= alarms[0] <= found

@@ -34,6 +34,7 @@ RIDGE = 1e-4
 STATIONARY = 1.3  # sigma of 30 s blocks over sigma of samples, above it an input wanders
 EARNED = 0.9  # the further regressors must cut the variance of the second half to this share
 MINIMUM_TRAVEL = 0.5
+JUMPS = (0.05, 3.0)  # a jump of CV is more than this, and than this times the largest learned
 
 
 class LearningError(ValueError):
@@ -145,6 +146,9 @@ def learn(samples: Floats, settings: ScadaSettings) -> NDArray:
         for used, earned in ((BASIC_WEIGHTS, 1.0), (N_WEIGHTS, EARNED))
     )
     ref['hold'] = hold > 0
+    smallest, factor = JUMPS
+    largest = float(np.abs(np.diff(samples[window, 1])).max())
+    ref['cv_jump'] = math.inf if hold else max(smallest, factor * largest)
     prediction = candidates[hold]
     ref['w'][:used], r1 = _bias(prediction.phi, x - prediction.xm, used)
     r2 = _flow_residual(ref, prediction, samples[window, 6])

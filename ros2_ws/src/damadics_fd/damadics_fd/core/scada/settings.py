@@ -22,7 +22,8 @@ class ScadaSettings:
     :param sigma: standard deviation of the sensor noise, share of full scale.
     :param wide_play: play of the second model of the friction test, share of stroke.
     :param gap_s: longest gap the models are carried over; a longer one restarts them.
-    :param settle_s: no test for this time after such a restart.
+    :param settle_s: no test for this time after such a restart, none of r1 after a jump of CV
+        such as the fault-free record does not show: when within the period it came is not known.
     :param saturated: no flow test while the model's flow is above the second of these limits and
         both F' and f are above the first: the flow meter shows no more than its range.
     :param actuator: nominal parameters.

@@ -42,6 +42,7 @@ REFERENCE = np.dtype(
         [
             ('pressure', PRESSURE, (2,)),
             ('hold', np.bool_),  # CV is held between samples
+            ('cv_jump', np.float64),  # change of CV between two samples that was not learned
             ('w', np.float64, (N_WEIGHTS,)),
             ('dp_mean', np.float64),
             ('g0', np.float64),
@@ -68,6 +69,7 @@ MONITOR = np.dtype(
             ('t', np.float64),
             ('t_raw', np.float64),  # last sample seen, accepted or thinned out
             ('t_test', np.float64),  # no test before
+            ('t_stem', np.float64),  # no test of r1 before
             ('filled', np.int64),  # pressure samples since the last restart
             ('past', np.float64, (2, TAPS)),
             ('p_hat', np.float64, (2,)),
@@ -163,6 +165,8 @@ def predict(
     s.cv[0] = cv
     s.xm[2] = s.xm[1]
     s.xm[1] = s.xm[0]
+    if abs(cv - s.cv[1]) > ref.cv_jump:
+        s.t_stem = t + cfg.settle_s
     slope0 = 0.0
     slope1 = 0.0
     if s.filled > 0:
@@ -283,6 +287,11 @@ def decide(s: Any, ref: Any) -> None:
             continue
         if s.masked and TEST_RESIDUAL[i] == R2:
             continue
+        if s.t < s.t_stem and TEST_RESIDUAL[i] == R1:
+            s.g[i, :] = 0.0
+            s.zero[i, :] = s.t
+            s.ratios[i] = 0.0
+            continue
         z = (value - ref.mu[i]) / ref.sd[i]
         z = min(max(z, -ref.clip[i]), ref.clip[i])
         for side in range(2):
@@ -301,7 +310,7 @@ def decide(s: Any, ref: Any) -> None:
     z1d = (s.residual[R1] + s.xm[0] - s.xd) / ref.s1
     gain = (z1 * z1 - z1d * z1d) / (2.0 * ref.kap2)
     s.llr += min(max(gain, -LLR_CLIP), LLR_CLIP)
-    if s.llr <= 0.0:
+    if s.llr <= 0.0 or s.t < s.t_stem:
         s.llr = 0.0
         s.llr_zero = s.t
     s.ratios[FRICTION_TEST] = s.llr / ref.llr_limit

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Multivariate detectors on lagged signals: PCA with T2 and Q, isolation forest."""
 
+from abc import abstractmethod
+
 import numpy as np
 
 from damadics_fd.evaluate.baselines.base import (
@@ -44,11 +46,13 @@ class Scaled(Detector):
         out[on] = self._score((features(samples)[on] - self._mean) / self._scale)
         return out
 
+    @abstractmethod
     def _learn(self, rows: Floats) -> None:
-        raise NotImplementedError
+        """Learn the model from scaled rows."""
 
+    @abstractmethod
     def _score(self, rows: Floats) -> Floats:
-        raise NotImplementedError
+        """Return the score of scaled rows."""
 
 
 class PrincipalComponents(Scaled):

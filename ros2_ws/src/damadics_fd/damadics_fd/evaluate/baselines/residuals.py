@@ -3,6 +3,7 @@
 """Classical tests on the deviation CV - X' and on a learned FIR model of the stem."""
 
 import math
+from abc import abstractmethod
 
 import numpy as np
 
@@ -71,8 +72,9 @@ class Deviation(Detector):
     def _residual(self, samples: Floats) -> Floats:
         return np.asarray(samples[:, CV] - samples[:, X])
 
+    @abstractmethod
     def _test(self, z: Floats) -> Floats:
-        raise NotImplementedError
+        """Return the statistic of standard residuals."""
 
 
 class FirResidual(Deviation):
