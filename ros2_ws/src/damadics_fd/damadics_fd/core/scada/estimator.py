@@ -15,7 +15,7 @@ from damadics_fd.core.modes import PHASE_HOLD, PHASE_INIT, PHASE_LEARN_PHI, PHAS
 from damadics_fd.core.scada.actuator import Actuator
 from damadics_fd.core.scada.monitor import ScadaMonitor
 from damadics_fd.core.scada.settings import ScadaSettings
-from damadics_fd.core.scada.step import REFERENCE
+from damadics_fd.core.scada.state import REFERENCE
 from damadics_fd.core.settings import Settings
 
 

@@ -26,7 +26,7 @@ from damadics_fd.core.scada.model import (
     advance_stem,
     copy_stem,
 )
-from damadics_fd.core.scada.step import HISTORY_LENGTH
+from damadics_fd.core.scada.state import HISTORY_LENGTH
 
 WINDOW = 600  # samples at most
 FIRST = 240  # of them for the coarse search

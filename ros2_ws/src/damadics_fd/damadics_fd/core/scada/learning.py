@@ -14,14 +14,8 @@ from damadics_fd.core.jit import jit
 from damadics_fd.core.scada.cusum import R1, TESTS, siegmund_limit
 from damadics_fd.core.scada.pressure import learn_pressure
 from damadics_fd.core.scada.settings import ScadaSettings
-from damadics_fd.core.scada.step import (
-    BASIC_WEIGHTS,
-    LLR_CLIP,
-    MONITOR,
-    N_WEIGHTS,
-    REFERENCE,
-    predict,
-)
+from damadics_fd.core.scada.state import BASIC_WEIGHTS, MONITOR, N_WEIGHTS, REFERENCE
+from damadics_fd.core.scada.step import LLR_CLIP, predict
 
 Floats = NDArray[np.float64]
 DAY_S = 86400.0

@@ -16,7 +16,8 @@ from damadics_fd.core.scada.cusum import TEST_NAMES
 from damadics_fd.core.scada.isolation import Isolation, Isolator
 from damadics_fd.core.scada.learning import LearningError, learn
 from damadics_fd.core.scada.settings import ScadaSettings
-from damadics_fd.core.scada.step import MONITOR, REFERENCE, accepts, predict, residuals, step
+from damadics_fd.core.scada.state import MONITOR, REFERENCE
+from damadics_fd.core.scada.step import accepts, predict, residuals, step
 
 Floats = NDArray[np.float64]
 TRACE = np.dtype(

@@ -14,7 +14,7 @@ from damadics_fd.core.scada.isolation import Isolation
 from damadics_fd.core.scada.learning import learn
 from damadics_fd.core.scada.monitor import ScadaMonitor
 from damadics_fd.core.scada.settings import ScadaSettings
-from damadics_fd.core.scada.step import HISTORY_LENGTH
+from damadics_fd.core.scada.state import HISTORY_LENGTH
 from damadics_fd.evaluate.baselines.base import P1, P2, T1, Detector, Floats
 
 SIGNATURE = ('m1', 'g1', 'd1', 'rms1', 'm2', 'g2', 'rms2', 'dP1', 'dP2', 'dT1')
