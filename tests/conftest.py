@@ -19,13 +19,14 @@ from rclpy.qos import QoSProfile
 class Peer:
     """A node of the test in its own domain: publishes samples, keeps what the nodes publish."""
 
-    def __init__(self, domain: int) -> None:
+    def __init__(self, domain: int, publishes: bool = True) -> None:
         self.context = Context()
         rclpy.init(context=self.context, domain_id=domain)
         self.node = rclpy.create_node('peer', context=self.context)
         self.executor = EventsExecutor(context=self.context)
         self.executor.add_node(self.node)
-        self.publisher = self.node.create_publisher(Measurement, 'measurement', qos.samples())
+        if publishes:
+            self.publisher = self.node.create_publisher(Measurement, 'measurement', qos.samples())
         self.got: dict[str, list] = {}
 
     def listen(self, kind, topic: str, profile: QoSProfile) -> list:

@@ -3,14 +3,12 @@
 """The page in a real browser, fed by a simulated valve through the real nodes."""
 
 import os
-import socket
 import time
-import urllib.error
-import urllib.request
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+import website
 from conftest import Peer, alone
 from damadics_bringup.launcher import arguments_of
 from damadics_bringup.processes import Processes, surroundings
@@ -18,29 +16,17 @@ from damadics_fd.ros import qos
 from damadics_msgs.msg import FaultEvent, FaultFlag
 
 sync_api = pytest.importorskip('playwright.sync_api')
-CHROMIUM = Path('/usr/bin/chromium')
 pytestmark = [
     pytest.mark.ros,
-    pytest.mark.skipif(not CHROMIUM.is_file(),
+    pytest.mark.skipif(not website.CHROMIUM.is_file(),
                        reason='no browser: apt-get install chromium for the tests of the page'),
 ]
-FLAGS = ['--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run', '--disable-sync',
-         '--disable-background-networking', '--disable-component-update']
 ROOT = Path(__file__).resolve().parents[1]
 BAG = ROOT / 'bags' / 'lugre_friction.mcap'
 PICTURES = os.environ.get('DAMADICS_SCREENSHOTS')  # folder to write pictures of the page to
 VALVE = 'lv101'
-# learn in seconds what takes a minute in earnest
-SETTINGS = {'mode': 'monitor', 'actuator': 'LV-101', 't_on': 1.0, 't_w': 3.0, 't_learn': 8.0,
-            'travel_min': 0.1}
-PLANT = {'scenario': 'random_nominal', 'model': 'lugre', 'rate': 200.0, 'seed': 1,
-         'duration': 1e6, 'wait_for_subscribers': 1}
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(('127.0.0.1', 0))
-        return probe.getsockname()[1]
+SETTINGS = {'mode': 'monitor', 'actuator': 'LV-101', **website.LEARN_QUICKLY}
+PLANT = {**website.PLANT, 'duration': 1e6, 'wait_for_subscribers': 1}
 
 
 class Site:
@@ -54,14 +40,7 @@ class Site:
 
     def start(self) -> None:
         self.processes.start('damadics_dashboard', 'dashboard', self.arguments)
-        deadline = time.monotonic() + 60.0
-        while time.monotonic() < deadline:
-            try:
-                urllib.request.urlopen(self.address, timeout=5.0).close()
-                return
-            except (urllib.error.URLError, OSError):
-                time.sleep(0.2)
-        raise AssertionError('the page is not served')
+        website.wait_until_served(self.address)
 
 
 @pytest.fixture(scope='module')
@@ -70,8 +49,8 @@ def system(tmp_path_factory):
     folder = tmp_path_factory.mktemp('dashboard')
     with pytest.MonkeyPatch.context() as patch:
         domain = alone(patch, folder)
-        port = free_port()
-        peer = Peer(domain)
+        port = website.free_port()
+        peer = Peer(domain, publishes=False)
         flags = peer.listen(FaultFlag, f'/{VALVE}/fault_flag', qos.FLAG)
         events = peer.listen(FaultEvent, f'/{VALVE}/fault_event', qos.EVENTS)
         with Processes(folder / 'logs', surroundings(domain)) as processes:
@@ -80,11 +59,9 @@ def system(tmp_path_factory):
                 processes.start('damadics_fd', node, arguments_of(SETTINGS, namespace=VALVE))
             processes.start('damadics_plant', 'plant', arguments_of(PLANT, namespace=VALVE))
             site = Site(processes, port, folder / 'page')
-            with sync_api.sync_playwright() as play:
-                browser = play.chromium.launch(executable_path=str(CHROMIUM), args=FLAGS)
+            with website.browser() as browser:
                 yield SimpleNamespace(peer=peer, flags=flags, events=events, browser=browser,
                                       processes=processes, site=site, errors=[])
-                browser.close()
         peer.close()
 
 

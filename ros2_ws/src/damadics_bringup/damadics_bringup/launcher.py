@@ -3,7 +3,6 @@
 """Command `run`: what the launch files do, on a machine without ROS 2's launch."""
 
 import argparse
-import os
 import signal
 import sys
 import time
@@ -12,6 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ament_index_python.packages import get_package_share_directory
+from damadics_fd.ros.commands import command_parser, state_folder
 
 from damadics_bringup.fleet import FleetError, Valve, read_fleet
 from damadics_bringup.processes import ProcessError, Processes
@@ -21,6 +21,7 @@ EXAMPLES = """examples:
   ros2 run damadics_bringup run fleet.yaml --dashboard     your valves
   ros2 run damadics_bringup run fleet.yaml --record bags/today"""
 LOOK = 0.2  # s between two looks at the processes
+END = {'recorder': 60.0}  # s to write what it still has; 5 s for the others
 FIRST_PAUSE, LONGEST_PAUSE = 1.0, 30.0  # s before a node that has died is started again
 STABLE = 60.0  # s after which a node counts as running
 FOREVER = 1e8  # s of simulated time
@@ -88,7 +89,7 @@ def tasks_of(valves: list[Valve], options: argparse.Namespace) -> list[Task]:
     if options.simulate:
         tasks += [
             Task(f'{valve.name}/plant', 'damadics_plant', 'plant', arguments_of(
-                {'duration': FOREVER, 'wait_for_subscribers': 1,
+                {'duration': FOREVER, 'wait_for_subscribers': 1 + bool(options.record),
                  'actuator': valve.settings.get('actuator', valve.name), **valve.simulate},
                 namespace=valve.name, topics=dict(valve.topics)))
             for valve in valves
@@ -142,11 +143,8 @@ def parser() -> argparse.ArgumentParser:
 
     :return: its parser.
     """
-    state = Path(os.environ.get('XDG_STATE_HOME') or Path.home() / '.local' / 'state')
-    p = argparse.ArgumentParser(
-        prog='run', epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter,
-        description='Start estimator and detector of every valve and keep them running.',
-    )
+    p = command_parser('run', 'Start estimator and detector of every valve and keep them '
+                       'running.', EXAMPLES)
     p.add_argument('fleet', nargs='?', type=Path,
                    help='list of the valves (YAML); default: one valve for a first look')
     p.add_argument('--simulate', action='store_true', help='start a simulated plant per valve')
@@ -155,7 +153,7 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument('--host', default='127.0.0.1', help='address of the web page (127.0.0.1)')
     p.add_argument('--port', type=int, default=8080, help='port of the web page (8080)')
     p.add_argument('--record', type=Path, metavar='DIR', help='record all topics into this bag')
-    p.add_argument('--logs', type=Path, default=state / 'damadics_fd' / 'logs', metavar='DIR',
+    p.add_argument('--logs', type=Path, default=state_folder() / 'logs', metavar='DIR',
                    help='where the output of every process goes (%(default)s)')
     p.add_argument('--for', dest='seconds', type=float, metavar='S', help='end after so long [s]')
     return p
@@ -171,8 +169,9 @@ def main(args: Sequence[str] | None = None) -> int:
     options = parser().parse_args(args)
     options.dashboard = options.dashboard or options.show
     stop: list[int] = []
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda signum, frame: stop.append(signum))
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) != signal.SIG_IGN or number != signal.SIGHUP:  # nohup
+            signal.signal(number, lambda signum, frame: stop.append(signum))
     share = Path(get_package_share_directory('damadics_bringup'))
     try:
         valves = read_fleet(options.fleet or share / 'config' / 'demo_valve.yaml')
@@ -180,13 +179,17 @@ def main(args: Sequence[str] | None = None) -> int:
         with Processes(options.logs) as processes:
             keeper = Keeper(processes, tasks)
             print(f'{len(valves)} valve(s): {", ".join(valve.name for valve in valves)}; '
-                  f'logs in {options.logs}; Ctrl-C ends all', flush=True)
+                  f'logs in {options.logs}; Ctrl-C ends all, a second one at once', flush=True)
             if options.dashboard:
                 print(f'The dashboard opens at http://{options.host}:{options.port}', flush=True)
             end = time.monotonic() + (options.seconds or 1e9)
             while not stop and time.monotonic() < end:
                 time.sleep(LOOK)
                 keeper.look()
+            signals = len(stop)
+            killed = processes.end_all(patient_with=END, hurry=lambda: len(stop) > signals)
+            if killed:
+                print(f'run: killed, as they did not end: {", ".join(killed)}', file=sys.stderr)
     except (FleetError, ProcessError) as problem:
         print(f'run: {problem}', file=sys.stderr)
         return 1

@@ -8,7 +8,7 @@ import signal
 import socket
 import subprocess
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 
@@ -110,15 +110,32 @@ class Processes:
         trace: TracebackType | None,
     ) -> None:
         """End what still runs."""
+        self.end_all()
+
+    def end_all(self, patience: float = 5.0, patient_with: Mapping[str, float] | None = None,
+                hurry: Callable[[], bool] = lambda: False) -> list[str]:
+        """
+        End all processes at the same time: SIGINT, and SIGKILL for what then still runs.
+
+        :param patience: time that they may take, from now on [s].
+        :param patient_with: another time for some of them [s].
+        :param hurry: asked meanwhile; True ends the patience with all.
+        :return: names of those that had to be killed.
+        """
+        longer = patient_with or {}
+        began = time.monotonic()
         for process in self._running.values():
             if process.poll() is None:
                 process.send_signal(signal.SIGINT)
-        for process in self._running.values():
-            try:
-                process.wait(5.0)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
+        killed = []
+        while alive := [name for name in self._running if not self.ended(name)]:
+            waited = time.monotonic() - began
+            for name in alive:
+                if waited > longer.get(name, patience) or hurry():
+                    self.kill(name)
+                    killed.append(name)
+            time.sleep(0.02)
+        return killed
 
     def forget(self, variable: str) -> None:
         """Start further processes without a variable of the environment."""
@@ -140,6 +157,7 @@ class Processes:
             self._running[label] = subprocess.Popen(
                 [executable(package, name), *arguments],
                 stdout=log, stderr=subprocess.STDOUT, env=self._environment,
+                start_new_session=True,  # Ctrl-C reaches it through this process, and once only
             )
 
     def log(self, name: str) -> Path:
@@ -153,6 +171,10 @@ class Processes:
     def exit_code(self, name: str) -> int | None:
         """Return the exit code of a process, None while it runs."""
         return self._running[name].poll()
+
+    def pid(self, name: str) -> int:
+        """Return the number of a process."""
+        return self._running[name].pid
 
     def kill(self, name: str) -> None:
         """End a process at once, as a crash would."""

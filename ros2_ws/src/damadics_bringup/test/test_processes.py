@@ -1,6 +1,7 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
 import socket
+import time
 
 import pytest
 from damadics_bringup.processes import (
@@ -59,3 +60,28 @@ def test_a_process_that_ignores_signals_is_killed(tmp_path, monkeypatch):
         with pytest.raises(ProcessError, match='did not end within'):
             processes.end('stubborn', patience=0.3)
         assert processes.ended('stubborn')
+
+
+def test_all_processes_end_at_the_same_time_and_none_is_left(tmp_path, monkeypatch):
+    script(tmp_path, monkeypatch,
+           '#!/bin/bash\n[ $1 = no ] && trap "" INT\necho ready\nsleep 60\n')
+    stubborn = [f'stubborn {n}' for n in range(6)]
+    with Processes(tmp_path / 'logs') as processes:
+        for label in (*stubborn, 'obedient'):
+            processes.start('any', 'script', ['no' if label in stubborn else 'yes'], label)
+        while any('ready' not in processes.log(label).read_text() for label in stubborn):
+            pass
+        began = time.monotonic()
+        killed = processes.end_all(patience=0.5, patient_with={'stubborn 0': 0.7})
+        assert time.monotonic() - began < 2 * 0.7, 'one after the other'
+        assert sorted(killed) == stubborn
+        assert all(processes.ended(label) for label in (*stubborn, 'obedient'))
+
+
+def test_the_patience_ends_when_somebody_is_in_a_hurry(tmp_path, monkeypatch):
+    script(tmp_path, monkeypatch, '#!/bin/bash\ntrap "" INT\necho ready\nsleep 60\n')
+    with Processes(tmp_path / 'logs') as processes:
+        processes.start('any', 'stubborn')
+        while 'ready' not in processes.log('stubborn').read_text():
+            pass
+        assert processes.end_all(patience=60.0, hurry=lambda: True) == ['stubborn']

@@ -8,6 +8,8 @@ import signal
 import sys
 from pathlib import Path
 
+from damadics_fd.ros.commands import command_parser, state_folder
+
 from damadics_dashboard.access import AccessError, Guard, check_binding
 
 HERE = Path(__file__).parent
@@ -23,17 +25,14 @@ def parser() -> argparse.ArgumentParser:
 
     :return: its parser.
     """
-    state = Path(os.environ.get('XDG_STATE_HOME') or Path.home() / '.local' / 'state')
-    p = argparse.ArgumentParser(
-        prog='dashboard', epilog=EXAMPLE, formatter_class=argparse.RawDescriptionHelpFormatter,
-        description='Web page for the people at the plant: every valve, its alarms, its signals.',
-    )
+    p = command_parser('dashboard', 'Web page for the people at the plant: every valve, its '
+                       'alarms, its signals.', EXAMPLE)
     p.add_argument('--host', default='127.0.0.1', help='address to serve on (127.0.0.1)')
     p.add_argument('--port', type=int, default=8080, help='port to serve on (8080)')
     p.add_argument('--token-file', type=Path, metavar='FILE',
                    help='file with the token that other machines must show; or set '
                         'DAMADICS_DASHBOARD_TOKEN')
-    p.add_argument('--state', type=Path, metavar='DIR', default=state / 'damadics_fd',
+    p.add_argument('--state', type=Path, metavar='DIR', default=state_folder(),
                    help='where the alarm history is kept (%(default)s)')
     p.add_argument('--follow', type=int, default=16, metavar='N',
                    help='take all samples of all valves in fleets up to N, otherwise only of '

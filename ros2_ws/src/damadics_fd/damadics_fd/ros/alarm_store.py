@@ -7,6 +7,8 @@ import os
 from pathlib import Path
 from typing import Any
 
+from damadics_fd.ros.commands import state_folder
+
 FORMAT = 'damadics_fd alarm 1'
 EPOCH = 10**17  # ns; smaller stamps count from the start of a simulated run
 # what makes an alarm another one; the rest of the state changes with every sample
@@ -17,10 +19,9 @@ def default_folder() -> Path:
     """
     Return where the alarms of this ROS domain are kept.
 
-    :return: a folder of the user, by the XDG base directory specification.
+    :return: a folder of the user.
     """
-    base = os.environ.get('XDG_STATE_HOME') or Path.home() / '.local' / 'state'
-    return Path(base, 'damadics_fd', f'domain_{os.environ.get("ROS_DOMAIN_ID", "0")}')
+    return state_folder() / f'domain_{os.environ.get("ROS_DOMAIN_ID", "0")}'
 
 
 def another_run(saved: int, stamp: int) -> bool:

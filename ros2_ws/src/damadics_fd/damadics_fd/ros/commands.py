@@ -1,0 +1,32 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""What the commands of all packages share: where they keep things, how they explain themselves."""
+
+import argparse
+import os
+from pathlib import Path
+
+
+def state_folder() -> Path:
+    """
+    Return where the project keeps what has to survive a restart.
+
+    :return: a folder of the user, by the XDG base directory specification.
+    """
+    base = os.environ.get('XDG_STATE_HOME') or Path.home() / '.local' / 'state'
+    return Path(base, 'damadics_fd')
+
+
+def command_parser(name: str, description: str, examples: str) -> argparse.ArgumentParser:
+    """
+    Begin the command line of a command.
+
+    :param name: of the command.
+    :param description: one sentence.
+    :param examples: shown below the options, line by line as written.
+    :return: a parser without arguments.
+    """
+    return argparse.ArgumentParser(
+        prog=name, description=description, epilog=examples,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )

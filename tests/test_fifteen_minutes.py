@@ -1,0 +1,199 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""
+The fifteen-minute check of a sceptical user, from one command to the report.
+
+The tests build on each other: one simulated valve, started by one command, serves the first four.
+"""
+
+import json
+import os
+import re
+import signal
+import subprocess
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+import website
+import yaml
+from conftest import Peer, alone
+from damadics_bringup.processes import Processes, executable, surroundings
+from damadics_fd.ros import qos
+from damadics_msgs.msg import FaultEvent, FaultFlag
+from damadics_msgs.srv import InjectFault
+
+pytestmark = pytest.mark.ros
+VALVE = 'lv101'
+ALARM = ('M', 'S', 'F')
+FRICTION = 4  # f4, servomotor and stem friction
+LUBLIN = Path(__file__).resolve().parents[2] / 'shared/data/lublin_actuator3_20min_1hz.csv'
+LEARNED = 900.0  # s, the end of learning in mode scada
+
+
+@pytest.fixture(scope='module')
+def chromium():
+    with website.browser() as chromium:
+        yield chromium
+
+
+@pytest.fixture(scope='module')
+def first(tmp_path_factory, chromium):
+    """The one command, the page it serves, and a node that listens."""
+    folder = tmp_path_factory.mktemp('first_look')
+    port = website.free_port()
+    fleet = folder / 'fleet.yaml'
+    fleet.write_text(yaml.safe_dump({'valves': {VALVE: {
+        'settings': {'actuator': 'LV-101', **website.LEARN_QUICKLY},
+        # estimator, recorder and page, so that the bag begins with the first sample
+        'simulate': {**website.PLANT, 'wait_for_subscribers': 3},
+    }}}))
+    with pytest.MonkeyPatch.context() as patch:
+        domain = alone(patch, folder)
+        peer = Peer(domain, publishes=False)
+        flags = peer.listen(FaultFlag, f'/{VALVE}/fault_flag', qos.FLAG)
+        events = peer.listen(FaultEvent, f'/{VALVE}/fault_event', qos.EVENTS)
+        with Processes(folder / 'logs', surroundings(domain)) as processes:
+            processes.forget('PYTEST_CURRENT_TEST')  # the page is to run as it does elsewhere
+            processes.start('damadics_bringup', 'run', [
+                str(fleet), '--simulate', '--dashboard', '--port', str(port),
+                '--record', str(folder / 'bag'), '--logs', str(folder / 'logs')])
+            address = f'http://127.0.0.1:{port}'
+            website.wait_until_served(address)
+            yield SimpleNamespace(
+                peer=peer, flags=flags, events=events, processes=processes, folder=folder,
+                bag=folder / 'bag', tile=website.Tile(address, VALVE, chromium))
+            if not processes.ended('run'):
+                processes.end('run', 90.0)
+        peer.close()
+
+
+def children(process: int) -> dict[str, int]:
+    """Return the processes that a process has started: number by name of the executable."""
+    numbers = Path(f'/proc/{process}/task/{process}/children').read_text().split()
+    words = {n: Path(f'/proc/{n}/cmdline').read_bytes().decode().split('\0') for n in numbers}
+    return {Path(w).name: int(n) for n, line in words.items() for w in line[1:2]}
+
+
+def rises(first) -> list[int]:
+    """Return the stamps at which an alarm was raised [ns], as the topic tells."""
+    return [e.header.stamp.sec * 10**9 + e.header.stamp.nanosec for e in first.events
+            if e.transition == FaultEvent.RAISED]
+
+
+def replayed(*words: object) -> list[dict]:
+    """Replay recordings with the command; return its results."""
+    out = Path(os.environ['XDG_STATE_HOME'], 'replay.json')
+    out.parent.mkdir(parents=True, exist_ok=True)
+    done = subprocess.run(
+        [executable('damadics_fd', 'replay'), *map(str, words), '--jobs', '1', '--out', str(out)],
+        capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    return json.loads(out.read_text())
+
+
+QUICKLY = [f'--set={name}={value}' for name, value in website.LEARN_QUICKLY.items()]
+
+
+def test_one_command_shows_a_friction_fault(first):
+    healthy = (FaultFlag.STATE_HEALTHY,)
+    assert first.peer.wait(lambda: first.flags and first.flags[-1].state in healthy, 120.0)
+    first.tile.wait(('ok',), 2.0)
+    assert not rises(first)
+    client = first.peer.node.create_client(InjectFault, f'/{VALVE}/inject_fault')
+    assert first.peer.wait(client.service_is_ready)
+    answer = client.call_async(InjectFault.Request(fault=FRICTION, strength=1.0))
+    assert first.peer.wait(answer.done)
+    assert answer.result().success
+    assert first.peer.wait(lambda: first.flags[-1].fault, 30.0), 'the friction is not flagged'
+    assert first.tile.wait(ALARM, 5.0) < 1.0
+    assert first.peer.wait(lambda: rises(first))
+
+
+def test_a_killed_detector_greys_the_tile_and_its_alarm_comes_back(first):
+    occurrence = first.flags[-1].occurrence
+    os.kill(children(first.processes.pid('run'))['detector'], signal.SIGKILL)
+    assert first.tile.wait(('off',), 5.0) < 1.0
+    first.peer.wait(lambda: False, 0.3)
+    before = len(first.flags)
+    first.tile.wait(ALARM, 60.0)  # `run` has started it again
+    assert first.peer.wait(lambda: len(first.flags) > before + 2, 30.0)
+    assert all(flag.fault for flag in first.flags[before:]), 'the alarm was lost'
+    assert {flag.occurrence for flag in first.flags[before:]} == {occurrence}
+
+
+def test_the_recorded_bag_gives_the_same_flag_time(first):
+    first.peer.wait(lambda: False, 3.0)
+    assert len(rises(first)) == 1, 'the restart raised an alarm'
+    started = children(first.processes.pid('run'))
+    assert set(started) == {'recorder', 'estimator', 'detector', 'plant', 'dashboard'}
+    first.processes.end('run', 90.0)
+    left = [name for name, number in started.items() if Path(f'/proc/{number}').exists()]
+    assert not left, 'processes are left'
+    (result,) = replayed(first.bag, *QUICKLY)
+    assert result['detections'][0]['stamp'] == rises(first)[0]
+
+
+def test_a_truncated_bag_is_replayed(first):
+    (bag,) = first.bag.glob('*.mcap')
+    whole = bag.read_bytes()
+    torn = first.folder / 'torn.mcap'
+    torn.write_bytes(whole[:len(whole) * 9 // 10])
+    verdict = subprocess.run([executable('damadics_fd', 'verify'), str(torn)],
+                             capture_output=True, text=True, timeout=60)
+    assert verdict.returncode == 3, verdict.stdout
+    (result,) = replayed(torn, *QUICKLY)
+    assert result['detections'][0]['stamp'] == rises(first)[0]
+    assert result['problems']
+
+
+def stuck(since: float, folder: Path) -> Path:
+    """Write the plant's record with the stem standing still from some instant on [s]."""
+    head, *lines = LUBLIN.read_text().splitlines()
+    position = head.split(',').index('L74_20X_X_pct')
+    rows = [line.split(',') for line in lines]
+    held = next(row[position] for row in rows if float(row[0]) >= since)
+    for row in rows:
+        if float(row[0]) >= since:
+            row[position] = held
+    path = folder / f'stuck_{since:.0f}.csv'
+    path.write_text('\n'.join([head, *(','.join(row) for row in rows), '']))
+    return path
+
+
+@pytest.mark.skipif(not LUBLIN.is_file(),
+                    reason=f'{LUBLIN} is not there: it carries no redistribution licence')
+def test_the_real_plant_gives_no_alarm_and_a_stuck_stem_one(domain, tmp_path):
+    instants = [LEARNED + 50.0 * n for n in range(1, 6)]
+    files = [stuck(since, tmp_path) for since in instants]
+    healthy, *faulty = replayed(LUBLIN, *files, '--mode', 'scada')
+    assert healthy['samples'] == 1200
+    assert healthy['detections'] == []
+    delays = [r['detections'][0]['t'] - t for r, t in zip(faulty, instants, strict=True)]
+    print('delays after the stem is stuck, s:', delays)
+    assert all(0.0 <= delay <= 20.0 for delay in delays)
+
+
+def test_the_report_compares_with_what_else_there_is(tmp_path, chromium, monkeypatch):
+    pytest.importorskip('filterpy')
+    pytest.importorskip('river')
+    evaluate = executable('damadics_fd', 'evaluate')
+    campaign = ['run', '--out', str(tmp_path), '--scenarios', 'f16_B', '--detectors', 'scada',
+                'cusum', 'ekf', 'adwin', '--calibration-days', '1', '--isolated-seeds', '0']
+    monkeypatch.setenv('DAMADICS_FD_CACHE', str(tmp_path / 'cache'))
+    done = subprocess.run([evaluate, *campaign], capture_output=True, text=True, timeout=250)
+    assert done.returncode == 0, done.stderr
+    report = tmp_path / 'index.html'
+    if chromium:
+        page = chromium.new_page()
+        errors: list[str] = []
+        page.on('pageerror', lambda error: errors.append(str(error)))
+        page.goto(report.as_uri())
+        heads = page.locator('table').first.locator('th').all_inner_texts()
+        page.close()
+        assert not errors
+    else:
+        table = report.read_text().partition('<table')[2].partition('</thead>')[0]
+        heads = re.findall(r'<th[^>]*>([^<]*)', table)
+    for name in ('SCADA-rate monitor', 'CUSUM', 'EKF', 'ADWIN'):
+        assert any(head.strip().startswith(name) for head in heads), f'{name} is not in {heads}'

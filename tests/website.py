@@ -1,0 +1,87 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""What the tests of the page share: its address, a browser, the state of a tile."""
+
+import re
+import socket
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
+from contextlib import contextmanager
+from html import unescape
+from pathlib import Path
+from typing import Any
+
+CHROMIUM = Path('/usr/bin/chromium')
+FLAGS = ['--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run', '--disable-sync',
+         '--disable-background-networking', '--disable-component-update']
+# learn in seconds what takes a minute in earnest
+LEARN_QUICKLY = {'t_on': 1.0, 't_w': 3.0, 't_learn': 8.0, 'travel_min': 0.1}
+PLANT = {'scenario': 'random_nominal', 'model': 'lugre', 'rate': 200.0, 'seed': 1}
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(('127.0.0.1', 0))
+        return probe.getsockname()[1]
+
+
+def wait_until_served(address: str, patience: float = 60.0) -> None:
+    deadline = time.monotonic() + patience
+    while time.monotonic() < deadline:
+        try:
+            urllib.request.urlopen(address, timeout=5.0).close()
+            return
+        except (urllib.error.URLError, OSError):
+            time.sleep(0.2)
+    raise AssertionError('the page is not served')
+
+
+@contextmanager
+def browser() -> Iterator[Any]:
+    """Start Chromium; None where there is none."""
+    if not CHROMIUM.is_file():
+        yield None
+        return
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as play:
+        chromium = play.chromium.launch(executable_path=str(CHROMIUM), args=FLAGS)
+        yield chromium
+        chromium.close()
+
+
+class Tile:
+    """
+    The tile of one valve: on the page in a browser, or else in the page as it is served.
+
+    :param address: of the fleet page.
+    :param valve: name of the valve.
+    :param chromium: the browser, if there is one.
+    """
+
+    def __init__(self, address: str, valve: str, chromium: Any = None) -> None:
+        self._address = address
+        self._valve = valve
+        self._page = chromium.new_page() if chromium else None
+        if self._page:
+            self._page.goto(address)
+
+    def kind(self) -> str:
+        """Return ok, learn, off, M, S, C or F; nothing while there is no tile."""
+        if self._page:
+            return self._page.evaluate(
+                f"document.querySelector('[data-valve={self._valve}]')?.dataset.kind || ''")
+        with urllib.request.urlopen(self._address, timeout=5.0) as answer:
+            text = unescape(answer.read().decode()).replace('\\"', '"')
+        found = re.search(rf'data-valve="{self._valve}" data-kind="(\w+)"', text)
+        return found[1] if found else ''
+
+    def wait(self, kinds: tuple[str, ...], patience: float) -> float:
+        """Wait until the tile is of one of the kinds and return how long that took."""
+        began = time.monotonic()
+        while (kind := self.kind()) not in kinds:
+            assert time.monotonic() - began < patience, f'the tile is {kind}, not {kinds}'
+            time.sleep(0.02)
+        return time.monotonic() - began
