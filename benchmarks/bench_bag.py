@@ -6,8 +6,8 @@ Measure reading, replaying and recording of bags against their peers, side by si
     python benchmarks/bench_bag.py               # reading, replay, memory
     python benchmarks/bench_bag.py --recorder    # recorder with publishers in other processes
 
-Times are CPU times of one process, the best of several runs: the ratios hold on a busy machine,
-the absolute figures are those of the machine.
+CPU times are those of one process with all its threads, wall times need a quiet machine; the best
+of several runs.
 """
 
 import argparse
@@ -25,6 +25,7 @@ from pathlib import Path
 import numpy as np
 from damadics_fd.bag import BagWriter, iter_columns, read_columns, write_columns
 from damadics_fd.bag.rosbag2 import qos
+from numpy.typing import NDArray
 
 SLOW_ROWS = 40_000  # read by the peers
 ROWS = 400_000
@@ -44,14 +45,14 @@ def recording(n: int, start: int = 0) -> dict[str, np.ndarray]:
     }
 
 
-def cpu(task: Callable[[], object], repeats: int) -> float:
-    """Return the least CPU time of several runs [s]."""
-    spent = []
+def spent(task: Callable[[], object], repeats: int) -> NDArray[np.float64]:
+    """Return the least CPU time and the least wall time of several runs [s]."""
+    times = []
     for _ in range(repeats):
-        begin = time.process_time()
+        wall, cpu = time.perf_counter(), time.process_time()
         task()
-        spent.append(time.process_time() - begin)
-    return min(spent)
+        times.append((time.process_time() - cpu, time.perf_counter() - wall))
+    return np.min(times, axis=0)
 
 
 def reading(folder: Path) -> None:
@@ -75,15 +76,18 @@ def reading(folder: Path) -> None:
             for connection, _, raw in reader.messages():
                 reader.deserialize(raw, connection.msgtype).x1  # noqa: B018
 
-    read_columns(small)  # loads the compiled loops
-    own = cpu(lambda: read_columns(large), 7) / ROWS
-    pieces = cpu(lambda: [len(c['x1']) for c in iter_columns(large)], 7) / ROWS
-    print(f'{"reading /measurement":34}{"us/message":>12}{"ratio":>8}')
-    print(f'{"read_columns":34}{own * 1e6:12.3f}{1:8.0f}')
-    print(f'{"iter_columns":34}{pieces * 1e6:12.3f}{pieces / own:8.2f}')
-    for name, task in (('rosbags', rosbags), ('mcap + mcap-ros2-support', mcap_ros2)):
-        peer = cpu(task, 2) / SLOW_ROWS
-        print(f'{name:34}{peer * 1e6:12.3f}{peer / own:8.0f}')
+    own = spent(lambda: read_columns(large), 15) / ROWS
+    pieces = spent(lambda: [len(c['x1']) for c in iter_columns(large)], 15) / ROWS
+    peers = {'rosbags': rosbags, 'mcap + mcap-ros2-support': mcap_ros2}
+    measured = {'read_columns': own, 'iter_columns': pieces} | {
+        name: spent(peer, 3) / SLOW_ROWS for name, peer in peers.items()
+    }
+    print(f'{"reading /measurement":34}{"CPU us/message":>16}{"ratio":>8}'
+          f'{"wall us/message":>18}{"ratio":>8}')
+    for name, (cpu, wall) in measured.items():
+        print(f'{name:34}{cpu * 1e6:16.4f}{cpu / own[0]:8.1f}{wall * 1e6:18.4f}'
+              f'{wall / own[1]:8.1f}')
+    print(f'bag: {large.stat().st_size / ROWS:.1f} B/message')
 
 
 def replaying(folder: Path) -> None:
@@ -92,11 +96,12 @@ def replaying(folder: Path) -> None:
     from damadics_fd.offline import Plan, replay, warm_up
 
     source = Recording(folder / 'large.mcap')
-    print(f'\n{"whole replay on one core":34}{"M samples/s":>12}{"day at 200 Hz":>16}')
+    print(f'\n{"whole replay":20}{"M samples/s and core":>22}{"day at 200 Hz":>16}'
+          f'{"M samples/s, wall":>20}')
     for mode in ('paper', 'monitor'):
         warm_up([Plan(mode)])
-        rate = ROWS / cpu(lambda mode=mode: replay(source, Plan(mode)), 5)
-        print(f'{mode:34}{rate / 1e6:12.2f}{86400 * 200 / rate:14.1f} s')
+        cpu, wall = ROWS / spent(lambda mode=mode: replay(source, Plan(mode)), 10)
+        print(f'{mode:20}{cpu / 1e6:22.2f}{86400 * 200 / cpu:14.1f} s{wall / 1e6:20.2f}')
 
 
 def memory(folder: Path) -> None:

@@ -5,8 +5,16 @@
 import numpy as np
 import pytest
 import zstandard
-from damadics_fd.bag import BagError, BagWriter, iter_columns, read_columns, write_columns
+from damadics_fd.bag import (
+    BagError,
+    BagWriter,
+    iter_columns,
+    loading,
+    read_columns,
+    write_columns,
+)
 from damadics_fd.bag.mcap_writer import McapWriter
+from damadics_fd.bag.reader import McapFile
 from damadics_fd.bag.sources import find_bags
 
 from .bag_support import SIGNALS, needs_messages, simulated
@@ -27,6 +35,47 @@ def test_columns_written_are_columns_read(tmp_path, name):
     states = read_columns(tmp_path / name, 'fault_state')
     assert (states['fault'] == columns['fault']).all()
     assert (states['strength'] == columns['strength']).all()
+
+
+@pytest.mark.parametrize('threads', [1, 2, 5])
+def test_other_cores_that_load_ahead_change_nothing(tmp_path, monkeypatch, threads):
+    monkeypatch.setattr(loading, 'THREADS', threads)
+    path, columns = tmp_path / 'a.mcap', simulated(60_000)
+    write_columns(path, columns)
+    for found in (read_columns(path), read_columns(path, on_problem=pytest.fail)):
+        assert all(found[name].tobytes() == columns[name].tobytes() for name in SIGNALS)
+    with McapFile(path) as mcap:
+        offsets = [batch.offset for batch in mcap.batches()]
+        sizes = [len(batch.starts) for batch in mcap.batches()]
+    assert len(offsets) > 8
+    data = bytearray(path.read_bytes())
+    data[offsets[4] + 5000] ^= 1
+    path.write_bytes(data)
+    with pytest.raises(BagError, match='damaged'):
+        read_columns(path)
+    told = []
+    found = read_columns(path, '/fault_state', on_problem=told.append)
+    assert len(told) == 1
+    states = np.cumsum([0, *sizes]) // 2
+    kept = np.delete(columns['strength'], slice(states[4], states[5]))
+    assert (found['strength'] == kept).all()
+
+
+def test_a_channel_that_appears_later_is_read_too(tmp_path):
+    with (tmp_path / 'a.mcap').open('wb') as stream:
+        writer = McapWriter(stream)
+        schema = writer.add_schema('std_msgs/msg/Float64', 'ros2msg', b'float64 data')
+        for first in (0, 5):
+            channel = writer.add_channel(schema, '/a', 'cdr', {})
+            for i in range(first, first + 5):
+                writer.add_message(channel, b'\0\1\0\0' + np.float64(i).tobytes(), i, i)
+            writer.end_chunk()
+        position = writer.position
+        writer.finish()
+    for size in (None, position):  # the second time without the summary
+        (tmp_path / 'b.mcap').write_bytes((tmp_path / 'a.mcap').read_bytes()[:size])
+        found = read_columns(tmp_path / 'b.mcap', '/a', on_problem=lambda text: None)
+        assert found['data'].tolist() == list(range(10))
 
 
 def test_chunks_are_bounded_and_add_up(tmp_path):

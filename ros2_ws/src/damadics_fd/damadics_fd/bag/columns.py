@@ -12,12 +12,17 @@ Read a topic of a bag as columns, by whole chunks instead of message by message.
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
+from damadics_fd.bag import kernels
 from damadics_fd.bag.decoder import Columns, Decoder, join
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.limits import Limits
 from damadics_fd.bag.reader import McapFile
 from damadics_fd.bag.sources import bag_files
 
+kernels.warm_up()  # here rather than with the first file
 MOST_PER_BYTE = 2  # messages that a file may announce before memory is taken for them
 
 
@@ -91,15 +96,10 @@ def iter_columns(
     for file in bag_files(path):
         with McapFile(file, on_problem is not None, limits) as mcap:
             decoders: dict[int, Decoder] = {}
-            for batch in mcap.batches():
-                for channel in mcap.channels.values():
-                    if channel.topic == topic and channel.id not in decoders:
-                        decoders[channel.id] = Decoder(mcap, channel.id, fields)
-                for number, decoder in decoders.items():
-                    rows = batch.starts[batch.channels == number]
-                    if len(rows):
-                        delivered = True
-                        yield decoder.decode(batch, rows, batch.sizes[batch.channels == number])
+            for at, data in mcap.chunks():
+                for columns in _decoded(mcap, at, data, topic, fields, decoders):
+                    delivered = True
+                    yield columns
             seen |= {channel.topic for channel in mcap.channels.values()}
             if on_problem:
                 for problem in mcap.problems:
@@ -113,3 +113,31 @@ def iter_columns(
                 f'has no topic {topic}; it has {", ".join(sorted(seen)) or "none"}', path
             )
         yield empty
+
+
+def _decoded(
+    mcap: McapFile, at: int, data: NDArray[np.uint8], topic: str, fields: Sequence[str] | None,
+    decoders: dict[int, Decoder],
+) -> Iterator[Columns]:
+    """Decode the messages of a topic in a chunk; `decoders` gets those of its channels."""
+    _note_channels(mcap, topic, fields, decoders)
+    if len(decoders) == 1:
+        columns = next(iter(decoders.values())).decode_alike(data)
+        if columns:
+            if len(columns['log_time']):
+                yield columns
+            return
+    batch = mcap.index(data, at)
+    _note_channels(mcap, topic, fields, decoders)
+    for number, decoder in decoders.items():
+        rows = batch.channels == number
+        if rows.any():
+            yield decoder.decode(batch, batch.starts[rows], batch.sizes[rows])
+
+
+def _note_channels(
+    mcap: McapFile, topic: str, fields: Sequence[str] | None, decoders: dict[int, Decoder]
+) -> None:
+    for channel in mcap.channels.values():
+        if channel.topic == topic and channel.id not in decoders:
+            decoders[channel.id] = Decoder(mcap, channel.id, fields)

@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damadics_fd.bag import kernels
+from damadics_fd.bag.alike import Alike, first_message
 from damadics_fd.bag.cdr import Layout, Place, layout_of
 from damadics_fd.bag.definition import Definition, parse_definition
 from damadics_fd.bag.errors import BagError
+from damadics_fd.bag.kernels import LOG_TIME, Words
 from damadics_fd.bag.reader import Batch, McapFile
 
 Columns = dict[str, NDArray[Any]]
-WIDE = ('f8', 'i8', 'u8')
-LOG_TIME = -16  # [B] its place, counted from the data of a message
 MOST_LAYOUTS = 64  # in one chunk, that are looked for by column
 _ELEMENT = re.compile(r'\.\d+(\.|$)')  # a member of a sequence of messages: no column
 
@@ -49,6 +49,7 @@ class Decoder:
         except (BagError, UnicodeDecodeError) as error:
             raise BagError(f'{channel.topic}: {error}', mcap.path) from error
         self._layouts: list[Layout] = []
+        self._alike: Alike | None = None
 
     def empty(self) -> Columns:
         """Return columns of no messages."""
@@ -71,71 +72,72 @@ class Decoder:
         groups: list[tuple[NDArray, Columns]] = []
         while left.any():
             first = int(left.argmax())
-            layout = self._layout(batch, int(starts[first]), int(sizes[first]))
+            layout = self._layout(batch.data[starts[first]:starts[first] + sizes[first]])
             if len(groups) < MOST_LAYOUTS:
                 rows = left & (sizes == sizes[first])
-                if layout.lengths or not rows.all():
-                    rows[rows] = same_layout(batch.data, starts[rows], layout)
+                rows[rows] = same_layout(batch.words, starts[rows], layout)
             else:
                 rows = np.zeros(len(left), bool)
             rows[first] = True
-            groups.append((rows, self._columns(batch.data, starts[rows], layout)))
+            groups.append((rows, self._columns(batch.words, starts[rows], layout)))
             left &= ~rows
         columns = groups[0][1] if len(groups) == 1 else _merge(groups)
-        columns['log_time'] = log_times(batch.data, starts)
+        columns['log_time'] = batch.words.w8[starts + LOG_TIME].view(np.int64)
         return columns
+
+    def decode_alike(self, data: NDArray[np.uint8]) -> Columns | None:
+        """
+        Decode a chunk of which all messages of this channel are alike, in one pass.
+
+        :param data: records of the chunk.
+        :return: the columns, None where it takes the general way.
+        """
+        alike = self._alike_in(data)
+        if not alike:
+            return None
+        block = alike.block(len(data) // (alike.size + kernels.BODY_AT))
+        count = alike.decode(kernels.words(data), len(data), self._number, block)
+        if count < 0:
+            self._alike = None
+            return None
+        whole = 2 * count > block.shape[1]
+        return alike.columns(block[:, :count] if whole else block[:, :count].copy())
 
     def decode_all(self, total: int) -> Columns | None:
         """
-        Decode the whole file where all messages have one layout and only 64-bit fields are read.
+        Decode the whole file where all messages are alike.
 
         :param total: number of messages.
-        :return: the columns, None where it is not so.
+        :return: the columns, None where it takes the general way.
         :raises BagError: where the file is damaged.
         """
-        block = np.empty((0, 0), np.uint64)
-        layout: Layout | None = None
+        block: NDArray[np.uint64] | None = None
         done = 0
-        for batch in self._mcap.batches():
-            count, size = kernels.select(batch.channels, batch.starts, batch.sizes, self._number)
-            starts = batch.starts[:count]
-            if not count:
-                continue
-            if layout is None:
-                layout = self._layout(batch, int(starts[0]), int(size))
-                places = self._places(layout)
-                stamps = [name for name, place in places.items() if isinstance(place, int)]
-                wide = [p for p in places.values() if isinstance(p, Place)]
-                if layout.order != '<' or any(
-                    p.dtype not in WIDE or p.repeat is not None for p in wide
-                ):
-                    return None
-                names = [n for n in places if n not in stamps] + ['log_time', *stamps]
-                block = np.empty((len(names), total), np.uint64)
-                offsets = np.array([*(p.offset for p in wide), LOG_TIME], np.int64)
-            if not layout.size <= size <= layout.size + 3 or done + count > total or (
-                not same_layout(batch.data, starts, layout).all()
-            ):
+        for _, data in self._mcap.chunks():
+            alike = self._alike_in(data)
+            if not alike:
                 return None
-            kernels.gather8(batch.data, starts, offsets, block, done)
-            for row, name in enumerate(stamps, len(offsets)):
-                place = places[name]
-                assert isinstance(place, int)
-                kernels.gather_stamp(batch.data, starts, place, block[row].view(np.int64), done)
+            if block is None:
+                block = alike.block(total)
+            count = alike.decode(kernels.words(data), len(data), self._number, block, done)
+            if count < 0:
+                return None
             done += count
-        if done != total:
+        if block is None or not self._alike or done != total:
             return None
-        kinds = [place.dtype for place in wide]
-        return {
-            name: block[row].view(kinds[row] if row < len(kinds) else np.int64)
-            for row, name in enumerate(names)
-        }
+        return self._alike.columns(block)
 
-    def _layout(self, batch: Batch, start: int, size: int) -> Layout:
-        message = batch.data[start:start + size]
+    def _alike_in(self, data: NDArray[np.uint8]) -> Alike | None:
+        """Return how to decode messages that are like the first one of a chunk."""
+        if not self._alike and (found := first_message(data, self._number)):
+            start, size = found
+            layout = self._layout(data[start:start + size])
+            self._alike = Alike.of(layout, size, self._places(layout))
+        return self._alike
+
+    def _layout(self, message: NDArray[np.uint8]) -> Layout:
         for layout in self._layouts:
-            here = np.zeros(1, np.int64)
-            if layout.size <= size <= layout.size + 3 and same_layout(message, here, layout)[0]:
+            if layout.size <= len(message) <= layout.size + 3 and layout.matches(message[None]):
                 return layout
         try:
             layout = layout_of(self.definition, self.kind, message.tobytes())
@@ -144,25 +146,12 @@ class Decoder:
         self._layouts = [*self._layouts[-MOST_LAYOUTS:], layout]
         return layout
 
-    def _columns(self, data: NDArray, starts: NDArray, layout: Layout) -> Columns:
-        places = self._places(layout)
-        columns: Columns = {}
-        wide = [
-            place for place in places.values() if isinstance(place, Place)
-            and place.dtype in WIDE and place.repeat is None
-        ]
-        if wide:
-            out = np.empty((len(wide), len(starts)), np.uint64)
-            kernels.gather8(data, starts, np.array([p.offset for p in wide], np.int64), out, 0)
-            values = dict(zip((p.name for p in wide), _ordered(out, layout.order), strict=True))
-        for name, place in places.items():
-            if isinstance(place, int):
-                columns[name] = _stamp(data, starts, place, layout.order)
-            elif place in wide:
-                columns[name] = values[place.name].view(layout.order + place.dtype)
-            else:
-                columns[name] = _general(data, starts, place, layout.order)
-        return columns
+    def _columns(self, words: Words, starts: NDArray, layout: Layout) -> Columns:
+        return {
+            name: _time(words, starts + place, layout.order) if isinstance(place, int)
+            else _field(words, starts, place, layout.order)
+            for name, place in self._places(layout).items()
+        }
 
     def _places(self, layout: Layout) -> dict[str, Place | int]:
         """Choose what to read: places by column name, the bare offset for times."""
@@ -191,58 +180,36 @@ class Decoder:
         return {name: found[name] for name in chosen if name != 'log_time'}
 
 
-def same_layout(data: NDArray, starts: NDArray, layout: Layout) -> NDArray[np.bool_]:
+def same_layout(words: Words, starts: NDArray, layout: Layout) -> NDArray[np.bool_]:
     """Tell which messages have their fields at the places of a layout."""
-    same = np.empty(len(starts), bool)
-    offsets = np.array([offset for offset, _ in layout.lengths], np.int64)
-    values = np.array([value for _, value in layout.lengths], layout.order + 'u4').view('<u4')
-    order = 1 if layout.order == '<' else 0
-    kernels.same_layout(data, starts, order, offsets, values, same)
+    same = words.w2[starts] == (0x0100 if layout.order == '<' else 0)
+    for offset, value in layout.lengths:
+        same &= _ordered(words.w4[starts + offset], layout.order) == value
     return same
 
 
-def log_times(data: NDArray, starts: NDArray) -> NDArray[np.int64]:
-    """Return the log times of messages [ns]."""
-    out = np.empty((1, len(starts)), np.uint64)
-    kernels.gather8(data, starts, np.array([LOG_TIME], np.int64), out, 0)
-    return out[0].view(np.int64)
+def _ordered(values: NDArray, order: str) -> NDArray:
+    return values if order == '<' else values.byteswap()
 
 
-def _ordered(words: NDArray, order: str) -> NDArray:
-    return words if order == '<' else words.byteswap()
+def _time(words: Words, at: NDArray, order: str) -> NDArray[np.int64]:
+    seconds = _ordered(words.w4[at], order).view(np.int32)
+    return seconds * np.int64(10**9) + _ordered(words.w4[at + 4], order)
 
 
-def _stamp(data: NDArray, starts: NDArray, offset: int, order: str) -> NDArray[np.int64]:
-    out = np.empty(len(starts), np.int64)
-    if order == '<':
-        kernels.gather_stamp(data, starts, offset, out, 0)
-        return out
-    seconds = _general(data, starts, Place('', 'i4', offset), order)
-    return seconds * np.int64(10**9) + _general(data, starts, Place('', 'u4', offset + 4), order)
-
-
-def _general(data: NDArray, starts: NDArray, place: Place, order: str) -> NDArray:
-    """Gather any field: narrow numbers, arrays, strings."""
+def _field(words: Words, starts: NDArray, place: Place, order: str) -> NDArray:
+    """Gather any field: numbers, arrays, strings."""
     if place.text:
         width = place.repeat or 0
-        rows = data[starts[:, None] + (place.offset + np.arange(width))]
+        rows = words.w1[starts[:, None] + (place.offset + np.arange(width))]
         return np.char.decode(rows.view(f'S{width}')[:, 0] if width else np.zeros(len(rows), 'S1'),
                               'utf-8', 'replace')
     size = int(place.dtype[1])
-    count = 1 if place.repeat is None else place.repeat
-    if size == 1:
-        out = data[starts[:, None] + (place.offset + np.arange(count))]
-    else:
-        out = np.empty((count, len(starts)), f'u{size}')
-        for i in range(count):
-            at = place.offset + i * size
-            if size == 8:
-                kernels.gather8(data, starts, np.array([at], np.int64), out[i:i + 1], 0)
-            else:
-                (kernels.gather4 if size == 4 else kernels.gather2)(data, starts, at, out[i])
-        out = np.ascontiguousarray(_ordered(out, order).T)
-    values = out.view(place.dtype)
-    return values[:, 0] if place.repeat is None else values
+    source: NDArray[Any] = words[(1, 2, 4, 8).index(size)]
+    if place.repeat is None:
+        return _ordered(source[starts + place.offset], order).view(place.dtype)
+    at = starts[:, None] + (place.offset + size * np.arange(place.repeat))
+    return _ordered(source[at], order).view(place.dtype)
 
 
 def _merge(groups: list[tuple[NDArray, Columns]]) -> Columns:

@@ -3,7 +3,6 @@
 """What a bag holds, and whether it is whole."""
 
 import struct
-import zlib
 from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from damadics_fd.bag.crc import crc32
 from damadics_fd.bag.decoder import Decoder
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.limits import Limits
@@ -221,6 +221,6 @@ def _crc(mcap: McapFile) -> int:
     crc = at = 0
     while at < mcap.end:
         data = mcap.read_bytes(at, min(BLOCK, mcap.end - at))
-        crc = zlib.crc32(data, crc)
+        crc = crc32(data, crc)
         at += len(data)
     return crc

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compiled loops over the bytes of a chunk: find the messages, gather their fields."""
 
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,39 +12,52 @@ from damadics_fd.core.jit import jit
 
 SCHEMA, CHANNEL, MESSAGE = int(Op.SCHEMA), int(Op.CHANNEL), int(Op.MESSAGE)
 HEAD = 9  # [B] opcode and length of a record
-MESSAGE_HEAD = 31  # [B] of a Message record before its data
+CHANNEL_AT = 9  # [B] places in a Message record: u2 channel
+BODY_AT = 31  # [B] its data
+LOG_TIME = -16  # [B] its log time, counted from the data
+BESIDES = 22  # [B] in its length besides the data
+PLAIN_CDR = 0x0100  # the first two bytes of a message in plain CDR, little endian
+BILLION = 1_000_000_000
+SHORTEST = 64  # [B] so that views of words have several elements, which numba tells from one
 
 
-@jit
-def word2(data: NDArray, at: int) -> Any:
-    """Return the little-endian u16 at a place."""
-    return np.uint16(data[at]) | np.uint16(np.uint16(data[at + 1]) << np.uint16(8))
+class Words(NamedTuple):
+    """
+    Little-endian words of a chunk; `w8[i]` starts at byte `i`, whatever its alignment.
+
+    Reading a word this way is one instruction in compiled code, and works in numpy, too.
+    """
+
+    w1: NDArray[np.uint8]
+    w2: NDArray[np.uint16]
+    w4: NDArray[np.uint32]
+    w8: NDArray[np.uint64]
 
 
-@jit
-def word4(data: NDArray, at: int) -> Any:
-    """Return the little-endian u32 at a place; compiles to one load."""
-    return (
-        np.uint32(data[at]) | np.uint32(data[at + 1]) << np.uint32(8)
-        | np.uint32(data[at + 2]) << np.uint32(16) | np.uint32(data[at + 3]) << np.uint32(24)
-    )
+def words(data: NDArray[np.uint8]) -> Words:
+    """
+    View a chunk as words at any byte.
 
+    :param data: contiguous, writable bytes (numba compiles read-only ones apart).
 
-@jit
-def word8(data: NDArray, at: int) -> Any:
-    """Return the little-endian u64 at a place; compiles to one load."""
-    low, high = np.uint64(word4(data, at)), np.uint64(word4(data, at + 4))
-    return low | high << np.uint64(32)
+    >>> hex(words(np.arange(100, dtype=np.uint8)).w4[1])
+    '0x4030201'
+    """
+    if len(data) < SHORTEST:
+        data = np.concatenate([data, np.zeros(SHORTEST, np.uint8)])
+    wide = [np.ndarray((len(data) - size + 1,), f'<u{size}', data, 0, (1,)) for size in (2, 4, 8)]
+    return Words(data, *wide)
 
 
 @jit
 def index(
-    data: NDArray, channels: NDArray, starts: NDArray, sizes: NDArray, others: NDArray
+    words: Words, end: int, channels: NDArray, starts: NDArray, sizes: NDArray, others: NDArray
 ) -> tuple[int, int, int]:
     """
     Walk the records of a chunk by their heads.
 
-    :param data: records, uint8.
+    :param words: the chunk.
+    :param end: its size [B].
     :param channels: written: channel of each message.
     :param starts: written: place of the data of each message.
     :param sizes: written: size of the data of each message.
@@ -53,104 +66,78 @@ def index(
         follows it is no whole record.
     """
     at = n = k = 0
-    while at + HEAD <= len(data):
-        length = word8(data, at + 1)
-        if length > np.uint64(len(data) - at - HEAD):
+    while at + HEAD <= end:
+        length = words.w8[at + 1]
+        if length > np.uint64(end - at - HEAD):
             break
-        op = data[at]
+        op = words.w1[at]
         if op == MESSAGE:
-            if length < 22:
+            if length < np.uint64(BESIDES):
                 break
-            channels[n] = word2(data, at + HEAD)
-            starts[n] = at + MESSAGE_HEAD
-            sizes[n] = np.int64(length) - 22
+            channels[n] = words.w2[at + CHANNEL_AT]
+            starts[n] = at + BODY_AT
+            sizes[n] = np.int64(length) - BESIDES
             n += 1
         elif op in (SCHEMA, CHANNEL):
             if k == len(others):
                 break
             others[k] = at
             k += 1
-        at += HEAD + int(length)
+        at += HEAD + np.int64(length)
     return n, k, at
 
 
 @jit
-def gather2(data: NDArray, starts: NDArray, offset: int, out: NDArray) -> None:
-    """Copy one 16-bit field of each message; `out` is (n,) uint16."""
-    for i in range(len(starts)):
-        out[i] = word2(data, starts[i] + offset)
-
-
-@jit
-def gather4(data: NDArray, starts: NDArray, offset: int, out: NDArray) -> None:
-    """Copy one 32-bit field of each message; `out` is (n,) uint32."""
-    for i in range(len(starts)):
-        out[i] = word4(data, starts[i] + offset)
-
-
-@jit
-def gather8(data: NDArray, starts: NDArray, offsets: NDArray, out: NDArray, first: int) -> None:
-    """Copy k 64-bit fields of n messages to columns `first`.. of `out`, uint64 with k rows."""
-    for i in range(len(starts)):
-        for j in range(len(offsets)):
-            out[j, first + i] = word8(data, starts[i] + offsets[j])
-
-
-@jit
-def select(channels: NDArray, starts: NDArray, sizes: NDArray, channel: int) -> tuple[int, int]:
+def decode(
+    words: Words, end: int, channel: int, size: int, places: NDArray, values: NDArray,
+    offsets: NDArray, times: NDArray, out: NDArray, first: int,
+) -> int:
     """
-    Move the places of one channel's messages to the front of `starts`.
+    Copy 64-bit fields and times of one channel's messages to columns, where all are alike.
 
-    :return: number of messages, and their size, -1 where they differ.
+    :param words: the chunk.
+    :param end: its size [B].
+    :param channel: number of the channel.
+    :param size: size of each message [B].
+    :param places: places in a message of the words that must be as expected.
+    :param values: these words.
+    :param offsets: places of the 64-bit fields, k of them.
+    :param times: places of the fields of builtin_interfaces/Time, m of them.
+    :param out: written from column `first` on, (k + m, most) uint64; times in ns.
+    :param first: column of the first message.
+    :return: number of messages, -1 where anything is else than expected.
     """
-    n = 0
-    size = 0
-    for i in range(len(starts)):
-        if channels[i] == channel:
-            size = sizes[i] if n == 0 or sizes[i] == size else -1
-            starts[n] = starts[i]
+    at = 0
+    n = first
+    k = len(offsets)
+    length = np.uint64(size + BESIDES)
+    while at + HEAD <= end:
+        here = words.w8[at + 1]
+        if words.w1[at] != MESSAGE or here > np.uint64(end - at - HEAD):
+            return -1
+        if here < np.uint64(BESIDES):
+            return -1
+        if words.w2[at + CHANNEL_AT] == channel:
+            if here != length or n == out.shape[1]:
+                return -1
+            body = at + BODY_AT
+            same = words.w2[body] == PLAIN_CDR
+            for j in range(len(places)):
+                same = same and words.w4[body + places[j]] == values[j]
+            if not same:
+                return -1
+            for j in range(k):
+                out[j, n] = words.w8[body + offsets[j]]
+            for j in range(len(times)):
+                second = np.int64(np.int32(words.w4[body + times[j]]))
+                out[k + j, n] = second * BILLION + np.int64(words.w4[body + times[j] + 4])
             n += 1
-    return n, size
-
-
-@jit
-def gather_stamp(data: NDArray, starts: NDArray, offset: int, out: NDArray, first: int) -> None:
-    """Copy a little-endian builtin_interfaces/Time of n messages to `out` from `first` on [ns]."""
-    for i in range(len(starts)):
-        seconds = np.int64(np.int32(word4(data, starts[i] + offset)))
-        out[first + i] = seconds * 1_000_000_000 + np.int64(word4(data, starts[i] + offset + 4))
-
-
-@jit
-def same_layout(
-    data: NDArray, starts: NDArray, order: int, offsets: NDArray, values: NDArray, out: NDArray
-) -> None:
-    """
-    Tell which messages have the CDR header and the length words of a layout.
-
-    :param data: records, uint8.
-    :param starts: places of the messages.
-    :param order: 1 little endian, 0 big endian.
-    :param offsets: places of the length words in a message.
-    :param values: their values, as read little endian.
-    :param out: written, bool.
-    """
-    for i in range(len(starts)):
-        at = starts[i]
-        same = data[at] == 0 and data[at + 1] == order
-        for j in range(len(offsets)):
-            same = same and word4(data, at + offsets[j]) == values[j]
-        out[i] = same
+        at += HEAD + np.int64(here)
+    return n - first if at == end else -1
 
 
 def warm_up() -> None:
     """Compile the loops, or load them from the cache."""
-    data = np.frombuffer(bytes(64), np.uint8)
-    starts, words = np.zeros(1, np.int64), np.zeros(1, np.int64)
-    index(data, np.empty(3, np.uint16), np.empty(3, np.int64), np.empty(3, np.int64), starts)
-    gather2(data, starts, 0, np.empty(1, np.uint16))
-    gather4(data, starts, 0, np.empty(1, np.uint32))
-    gather8(data, starts, words, np.empty((1, 1), np.uint64), 0)
-    gather_stamp(data, starts, 0, np.empty(1, np.int64), 0)
-    select(np.empty(0, np.uint16), starts[:0], starts[:0], 0)
-    same_layout(data, starts, 1, words, np.zeros(1, np.uint32), np.empty(1, bool))
+    data, none = words(np.zeros(SHORTEST, np.uint8)), np.empty(0, np.int64)
+    index(data, 0, np.empty(0, np.uint16), none, none, none)
+    decode(data, 0, 0, 0, none, np.empty(0, np.uint32), none, none, np.empty((1, 2), np.uint64), 0)

@@ -4,7 +4,6 @@
 
 import struct
 import time
-import zlib
 from collections.abc import Sequence
 from typing import Any, Protocol
 
@@ -12,6 +11,7 @@ import numpy as np
 import zstandard
 from numpy.typing import NDArray
 
+from damadics_fd.bag.crc import crc32
 from damadics_fd.bag.records import (
     CHUNK,
     CHUNK_INDEX,
@@ -32,7 +32,7 @@ from damadics_fd.bag.records import (
 
 LIBRARY = 'damadics_fd'
 CHUNK_SIZE = 1 << 20  # [B] uncompressed
-LEVEL = -1  # of zstd: 2 % larger than 1, and twice as fast to read
+LEVEL = -4  # of zstd: a tenth larger than 1, and less than half the time to read
 
 
 class Sink(Protocol):
@@ -94,7 +94,7 @@ class McapWriter:
 
     def _write(self, data: bytes) -> None:
         self._stream.write(data)
-        self._crc = zlib.crc32(data, self._crc)
+        self._crc = crc32(data, self._crc)
         self.position += len(data)
 
     def _reset_chunk(self) -> None:
@@ -236,7 +236,7 @@ class McapWriter:
         at = self.position
         chunk = record(
             Op.CHUNK,
-            CHUNK.pack(start, end, len(content), zlib.crc32(content)),
+            CHUNK.pack(start, end, len(content), crc32(content)),
             string('zstd'),
             struct.pack('<Q', len(packed)),
             packed,
@@ -303,5 +303,5 @@ class McapWriter:
         places = self.position, self.position + len(summary)
         footer = HEAD.pack(Op.FOOTER, FOOTER.size) + struct.pack('<QQ', *places)
         data = summary + offsets + footer
-        self._write(data + struct.pack('<I', zlib.crc32(data)) + MAGIC)
+        self._write(data + struct.pack('<I', crc32(data)) + MAGIC)
         self._stream.flush()

@@ -4,7 +4,6 @@
 
 import os
 import re
-import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 from damadics_fd.bag import kernels
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.limits import Limits
+from damadics_fd.bag.loading import Loader
 from damadics_fd.bag.records import (
     HEAD,
     MAGIC,
@@ -24,29 +24,25 @@ from damadics_fd.bag.records import (
     Op,
     Schema,
     parse_channel,
-    parse_chunk,
     parse_metadata,
     parse_schema,
     record,
 )
 from damadics_fd.bag.summary import read_summary
-from damadics_fd.bag.unpack import decompress, open_plain
+from damadics_fd.bag.unpack import open_plain
 from damadics_fd.bag.wellformed import well_formed
 
 LOOSE = 1 << 20  # [B] handled at a time where there are no chunks
 _HEAD_PATTERN = re.compile(rb'[\x01-\x0f](?=.{4}\x00{4})', re.DOTALL)
 
 
-class _GivenUp(Exception):  # noqa: N818
-    """There are too many damaged places."""
-
-
 class _Found(NamedTuple):
-    """A record; the content of a chunk is decompressed and checked."""
+    """A record; `chunk` holds the records of a chunk, decompressed and checked."""
 
     op: int
     length: int
     content: bytes = b''
+    chunk: NDArray[np.uint8] = np.empty(0, np.uint8)
 
 
 class Problem(NamedTuple):
@@ -59,9 +55,10 @@ class Problem(NamedTuple):
 @dataclass
 class Batch:
     """
-    The messages of one chunk.
+    The messages of one chunk, to be used until the next one is read.
 
     :param data: records, uint8.
+    :param words: the same as words.
     :param channels: channel number of each message.
     :param starts: place of the data of each message.
     :param sizes: size of the data of each message [B].
@@ -69,6 +66,7 @@ class Batch:
     """
 
     data: NDArray[np.uint8]
+    words: kernels.Words
     channels: NDArray[np.uint16]
     starts: NDArray[np.int64]
     sizes: NDArray[np.int64]
@@ -76,10 +74,7 @@ class Batch:
 
     def log_times(self, rows: NDArray | slice = slice(None)) -> NDArray[np.int64]:
         """Return the log times of some messages [ns]."""
-        out = np.empty((1, len(self.starts[rows])), np.uint64)
-        offsets = np.array([-16], np.int64)
-        kernels.gather8(self.data, self.starts[rows], offsets, out, 0)
-        return out[0].view(np.int64)
+        return self.words.w8[self.starts[rows] + kernels.LOG_TIME].view(np.int64)
 
     def message(self, row: int) -> bytes:
         """Return one serialised message."""
@@ -108,12 +103,15 @@ class McapFile:
         self.end = 0  # [B] where the walk has seen the end of the data section
         self.crc = 0  # of the data section, 0 where the file has none
         self._tolerant = tolerant
+        self._given_up = False
         self._text = 0
         self._stream: BinaryIO = open_plain(self.path, limits)
         self._size = os.fstat(self._stream.fileno()).st_size
         self.summary = read_summary(self._read, self._size, limits)
         self.schemas.update(self.summary.schemas)
         self.channels.update(self.summary.channels)
+        self._chunked = bool(self.summary.lengths)
+        self._loader = self._make_loader()
 
     def __enter__(self) -> Self:
         """Return the file."""
@@ -121,7 +119,14 @@ class McapFile:
 
     def __exit__(self, *exception: object) -> None:
         """Close the file."""
+        self._loader.close()
         self._stream.close()
+
+    def _make_loader(self) -> Loader:
+        listed = {} if self.summary.moved else {
+            at + HEAD.size: length - HEAD.size for at, length in self.summary.lengths.items()
+        }
+        return Loader(self._stream.fileno(), self.limits, listed)
 
     def _read(self, at: int, size: int) -> bytes:
         return os.pread(self._stream.fileno(), size, at)
@@ -131,12 +136,40 @@ class McapFile:
         return self._read(at, size)
 
     def problem(self, offset: int, text: str) -> None:
-        """Note damage, or raise it where it is not tolerated."""
+        """Note damage, or raise it where it is not tolerated; a search may meet it twice."""
+        if self.problems and self.problems[-1] == (offset, text):
+            return
         if not self._tolerant:
             raise BagError(f'{text} (at byte {offset}); see verify and recover', self.path)
-        self.problems.append(Problem(offset, text))
-        if len(self.problems) > self.limits.problems:
-            raise _GivenUp
+        if len(self.problems) < self.limits.problems:
+            self.problems.append(Problem(offset, text))
+        elif not self._given_up:
+            self._given_up = True
+            self.problems.append(Problem(offset, 'too many damaged places: the rest is left'))
+
+    def chunks(self) -> Iterator[tuple[int, NDArray[np.uint8]]]:
+        """
+        Yield the records of chunks in file order, each with the place of the chunk.
+
+        Messages outside of chunks are put together. The bytes are to be used until the next ones.
+
+        :raises BagError: at damage, unless it is tolerated.
+        """
+        loose: list[bytes] = []
+        size = 0
+        for at, found in self._records():
+            if found.op == Op.MESSAGE:
+                loose.append(record(found.op, found.content))
+                size += len(loose[-1])
+                if size < LOOSE:
+                    continue
+            if loose:
+                yield at, np.frombuffer(bytearray().join(loose), np.uint8)
+                loose, size = [], 0
+            if found.op == Op.CHUNK:
+                yield at, found.chunk
+        if loose:
+            yield self._size, np.frombuffer(bytearray().join(loose), np.uint8)
 
     def batches(self) -> Iterator[Batch]:
         """
@@ -144,24 +177,10 @@ class McapFile:
 
         :raises BagError: at damage, unless it is tolerated.
         """
-        loose: list[bytes] = []  # messages outside of chunks
-        size = 0
-        try:
-            for at, found in self._records():
-                if found.op == Op.MESSAGE:
-                    loose.append(record(found.op, found.content))
-                    size += len(loose[-1])
-                    if size < LOOSE:
-                        continue
-                if loose:
-                    yield from self._index(b''.join(loose), at)
-                    loose, size = [], 0
-                if found.op == Op.CHUNK:
-                    yield from self._index(found.content, at)
-            if loose:
-                yield from self._index(b''.join(loose), self._size)
-        except _GivenUp:
-            self.problems.append(Problem(self._size, 'too many damaged places: the rest is left'))
+        for at, data in self.chunks():
+            batch = self.index(data, at)
+            if len(batch.starts):
+                yield batch
 
     def _records(self) -> Iterator[tuple[int, '_Found']]:
         """Yield chunks and messages of the data section; take note of everything else."""
@@ -171,7 +190,9 @@ class McapFile:
         else:
             self.problem(0, 'does not start as an MCAP file')
         doubtful = None  # the record before, where nothing vouches for its length
-        while at < self._size:
+        self._loader.close()
+        self._loader = self._make_loader()
+        while at < self._size and not self._given_up:
             try:
                 found = self._record(at)
             except BagError as error:
@@ -190,7 +211,8 @@ class McapFile:
                 yield at, found
                 doubtful = None
             at += HEAD.size + found.length
-        self.problem(at, 'ends without a footer: the recording was not closed')
+        if not self._given_up:
+            self.problem(at, 'ends without a footer: the recording was not closed')
 
     def _record(self, at: int) -> '_Found':
         """Read the record at a place; raise where there is none."""
@@ -198,6 +220,8 @@ class McapFile:
         if len(head) < HEAD.size:
             raise BagError('ends in the middle of a record')
         op, length = HEAD.unpack(head)
+        if op == Op.CHUNK and not self._chunked:
+            self._chunked = well_formed(Op.CHUNK, self._read(at + HEAD.size, 512), length)
         if at + HEAD.size + length > self._size:
             raise BagError('ends in the middle of a record, or the record is damaged')
         if length > self.limits.record:
@@ -207,16 +231,13 @@ class McapFile:
         if not 0 < op < 0x10:
             raise BagError(f'there is no record type {op:#x}')
         op = Op(op)
+        if op == Op.CHUNK:
+            chunk = self._loader.load(at + HEAD.size, length)
+            return _Found(op, length, chunk=chunk)
         content = self._read(at + HEAD.size, length if op in _PARSED else min(length, 512))
         if not well_formed(op, content, length):
             raise BagError(f'the {op.name} record is damaged')
-        if op == Op.CHUNK:
-            chunk, packed = parse_chunk(content)
-            content = decompress(chunk, packed, self.limits)
-            if chunk.crc and zlib.crc32(content) != chunk.crc:
-                raise BagError('a chunk is damaged: its CRC does not match')
-        else:
-            self._note(op, content)
+        self._note(op, content)
         return _Found(op, length, content)
 
     def _note(self, op: Op, content: bytes) -> None:
@@ -235,23 +256,29 @@ class McapFile:
         elif op == Op.METADATA:
             self.metadata.append(parse_metadata(content))
 
-    def _index(self, data: bytes, at: int) -> Iterator[Batch]:
-        buffer = np.frombuffer(data, np.uint8)
-        most = len(buffer) // kernels.MESSAGE_HEAD + 1
+    def index(self, data: NDArray[np.uint8], at: int) -> Batch:
+        """
+        Find the messages of a chunk; take note of schemas and channels.
+
+        :param data: its records.
+        :param at: place of the chunk.
+        :raises BagError: at damage, unless it is tolerated.
+        """
+        most = len(data) // kernels.BODY_AT + 1
         channels, starts = np.empty(most, np.uint16), np.empty(most, np.int64)
         sizes, others = np.empty(most, np.int64), np.empty(1 << 17, np.int64)
-        n, k, end = kernels.index(buffer, channels, starts, sizes, others)
-        for place in others[:k]:
+        words = kernels.words(data)
+        n, k, end = kernels.index(words, len(data), channels, starts, sizes, others)
+        for place in others[:k].tolist():
             op, length = HEAD.unpack_from(data, place)
-            content = data[place + HEAD.size:place + HEAD.size + length]
+            content = data[place + HEAD.size:place + HEAD.size + length].tobytes()
             try:
                 self._note(Op(op), content)
             except BagError as error:
                 self.problem(at, error.reason)
-        if end != len(buffer):
+        if end != len(data):
             self.problem(at, 'a chunk ends in the middle of a record')
-        if n:
-            yield Batch(buffer, channels[:n], starts[:n], sizes[:n], at)
+        return Batch(data, words, channels[:n], starts[:n], sizes[:n], at)
 
     def _search(self, at: int) -> int | None:
         """Find the next place where records follow each other again."""
@@ -266,7 +293,14 @@ class McapFile:
         return None
 
     def _chain(self, at: int, links: int = 3) -> bool:
-        """Tell whether whole records follow each other from here."""
+        """
+        Tell whether whole records follow each other from here.
+
+        Where there are chunks, what looks like a message is a piece of a damaged one: compression
+        may leave it as it was.
+        """
+        if self._chunked and self._read(at, 1)[0] == Op.MESSAGE:
+            return False
         for _ in range(links):
             head = self._read(at, HEAD.size + 512)
             if len(head) < HEAD.size:
@@ -283,4 +317,4 @@ class McapFile:
         return True
 
 
-_PARSED = (Op.HEADER, Op.SCHEMA, Op.CHANNEL, Op.MESSAGE, Op.CHUNK, Op.METADATA)
+_PARSED = (Op.HEADER, Op.SCHEMA, Op.CHANNEL, Op.MESSAGE, Op.METADATA)

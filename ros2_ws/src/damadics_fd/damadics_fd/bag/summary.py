@@ -2,12 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """The summary at the end of a finished MCAP file."""
 
-import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from damadics_fd.bag.crc import crc32
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.limits import Limits
 from damadics_fd.bag.records import (
@@ -36,6 +36,7 @@ class Summary:
 
     :param counts: messages by channel.
     :param chunks: by the place of each chunk the places of its message indexes.
+    :param lengths: by the place of each chunk the length of its record [B].
     :param present: it was there and its CRC was right.
     :param moved: bytes are missing or were added before it, so that no place in it is right.
     """
@@ -44,6 +45,7 @@ class Summary:
     channels: dict[int, Channel] = field(default_factory=dict)
     counts: dict[int, int] = field(default_factory=dict)
     chunks: dict[int, dict[int, int]] = field(default_factory=dict)
+    lengths: dict[int, int] = field(default_factory=dict)
     present: bool = False
     moved: bool = False
 
@@ -67,7 +69,7 @@ def read_summary(read: Read, size: int, limits: Limits) -> Summary:
         return Summary()
     for start in _starts(read, stated, end, limits):
         data = read(start, end - start + FOOTER_SIZE - 4)
-        if zlib.crc32(data) == crc or (crc == 0 and start == stated):
+        if crc32(data) == crc or (crc == 0 and start == stated):
             try:
                 summary = _parse(memoryview(data)[:end - start])
             except (BagError, ValueError):
@@ -104,7 +106,7 @@ def _parse(data: memoryview) -> Summary:
             summary.channels[channel.id] = channel
         elif op == Op.CHUNK_INDEX:
             index = Fields(content)
-            _, _, offset, _ = index.unpack(CHUNK_INDEX)
+            _, _, offset, summary.lengths[offset] = index.unpack(CHUNK_INDEX)
             entries = np.frombuffer(index.bytes_(), '<u2,<u8')
             summary.chunks[offset] = {int(number): int(at) for number, at in entries}
         elif op == Op.STATISTICS:

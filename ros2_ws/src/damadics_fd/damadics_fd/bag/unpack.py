@@ -1,16 +1,21 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Decompression within limits."""
+"""Chunks and whole files, decompressed within limits."""
 
+import os
 import tempfile
 from pathlib import Path
 from typing import BinaryIO
 
+import numpy as np
 import zstandard
+from numpy.typing import NDArray
 
+from damadics_fd.bag.crc import crc32
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.limits import Limits
-from damadics_fd.bag.records import ChunkHead
+from damadics_fd.bag.records import ChunkHead, Op, parse_chunk
+from damadics_fd.bag.wellformed import well_formed
 
 _ZSTD_MAGIC = b'\x28\xb5\x2f\xfd'
 _FOREIGN = {
@@ -19,34 +24,69 @@ _FOREIGN = {
 }
 
 
-def decompress(head: ChunkHead, packed: memoryview, limits: Limits) -> bytes:
-    """
-    Return the records of a chunk.
+class Slot:
+    """Memory for one chunk at a time: what is used again need not be mapped and cleared again."""
 
-    :param head: what the chunk says about itself.
-    :param packed: its compressed records.
-    :param limits: what it may ask for.
-    :raises BagError: where it asks for more or does not hold what it says.
-    """
-    if head.size > limits.chunk or head.size > max(1 << 16, limits.ratio * len(packed)):
-        raise BagError(f'a chunk of {head.size} bytes from {len(packed)} is beyond the limit')
-    if head.compression == '':
-        data = bytes(packed)
-    elif head.compression == 'zstd':
-        try:
-            if zstandard.frame_content_size(packed) not in (head.size, -1):
-                raise BagError('a chunk is damaged: its size does not match')
-            decompressor = zstandard.ZstdDecompressor()
-            data = decompressor.decompress(packed, max_output_size=max(head.size, 1))
-        except zstandard.ZstdError as error:
-            raise BagError('a chunk is damaged: it cannot be decompressed') from error
-    elif head.compression == 'lz4':
-        data = _lz4(packed, head.size)
-    else:
-        raise BagError(f'a chunk has the unknown compression {head.compression[:20]!r}')
-    if len(data) != head.size:
-        raise BagError('a chunk is damaged: its size does not match')
-    return data
+    def __init__(self) -> None:
+        self._packed = bytearray()
+        self._data = np.empty(0, np.uint8)
+        self._zstd = zstandard.ZstdDecompressor()
+
+    def load(self, fd: int, at: int, length: int, limits: Limits) -> NDArray[np.uint8]:
+        """
+        Read the content of a Chunk record, decompress it and check its CRC.
+
+        :param fd: file.
+        :param at: place of the content.
+        :param length: its length [B].
+        :param limits: what it may ask for.
+        :return: records of the chunk, to be used until the next `load`.
+        :raises BagError: where it is damaged or asks for more.
+        """
+        if length > len(self._packed):
+            self._packed = bytearray(length)
+        content = memoryview(self._packed)[:length]
+        if os.preadv(fd, [content], at) < length:
+            raise BagError('ends in the middle of a record')
+        if not well_formed(Op.CHUNK, bytes(content[:512]), length):
+            raise BagError('the CHUNK record is damaged')
+        chunk, packed = parse_chunk(content)
+        if chunk.size > limits.chunk or chunk.size > max(1 << 16, limits.ratio * len(packed)):
+            raise BagError(f'a chunk of {chunk.size} bytes from {len(packed)} is beyond the limit')
+        if chunk.size > len(self._data):
+            self._data = np.empty(chunk.size, np.uint8)
+        data = self._data[:chunk.size]
+        if self._decompress(chunk, packed, memoryview(data)) != chunk.size:
+            raise BagError('a chunk is damaged: its size does not match')
+        if chunk.crc and crc32(data) != chunk.crc:
+            raise BagError('a chunk is damaged: its CRC does not match')
+        return data
+
+    def _decompress(self, chunk: ChunkHead, packed: memoryview, data: memoryview) -> int:
+        """Fill `data`; return how much there is, which may be more."""
+        if chunk.compression == 'zstd':
+            try:
+                return self._unzstd(packed, data)
+            except zstandard.ZstdError as error:
+                raise BagError('a chunk is damaged: it cannot be decompressed') from error
+        plain: bytes | memoryview = packed
+        if chunk.compression == 'lz4':
+            plain = _lz4(packed, chunk.size)
+        elif chunk.compression != '':
+            raise BagError(f'a chunk has the unknown compression {chunk.compression[:20]!r}')
+        if len(plain) == len(data):
+            data[:] = plain
+        return len(plain)
+
+    def _unzstd(self, packed: memoryview, data: memoryview) -> int:
+        stated = zstandard.frame_content_size(packed)
+        if stated not in (len(data), -1):
+            return stated
+        reader = self._zstd.stream_reader(packed)  # decompresses right into `data`
+        done = 0
+        while done < len(data) and (count := reader.readinto(data[done:])):
+            done += count
+        return done + len(reader.read(1))
 
 
 def _lz4(packed: memoryview, size: int) -> bytes:
