@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damadics_fd.core.jit import jit
-from damadics_fd.core.scada.cusum import R1, TESTS, siegmund_limit
+from damadics_fd.core.scada.cusum import R1, R2, TESTS, siegmund_limit
 from damadics_fd.core.scada.pressure import learn_pressure
 from damadics_fd.core.scada.settings import ScadaSettings
 from damadics_fd.core.scada.state import BASIC_WEIGHTS, MONITOR, N_WEIGHTS, REFERENCE
@@ -28,6 +28,9 @@ RIDGE = 1e-4
 STATIONARY = 1.3  # sigma of 30 s blocks over sigma of samples, above it an input wanders
 EARNED = 0.9  # the further regressors must cut the variance of the second half to this share
 MINIMUM_TRAVEL = 0.5
+# Standard errors of the learned mean by which the allowance grows, by length of block.
+STANDARD_ERRORS = {1: 0.0, 5: 4.0, 10: 4.0, 30: 5.0}
+SLOW = 30  # block of the tests that sum up hundreds of samples
 JUMPS = (0.05, 3.0)  # a jump of CV is more than this, and than this times the largest learned
 
 
@@ -146,8 +149,9 @@ def learn(samples: Floats, settings: ScadaSettings) -> NDArray:
     prediction = candidates[hold]
     ref['w'][:used], r1 = _bias(prediction.phi, x - prediction.xm, used)
     r2 = _flow_residual(ref, prediction, samples[window, 6])
+    slow = _slow_flow_sigma(ref, settings, prediction, samples[window])
     wandering = not all(_stationary(v) for v in samples[window, 3:6].T if not np.isnan(v).all())
-    _limits(ref, settings, r1, r2, samples[window], wandering)
+    _limits(ref, settings, r1, r2, slow, samples[window], wandering)
     _friction_limit(ref, settings, r1, prediction, wandering)
     return reference
 
@@ -194,9 +198,28 @@ def _flow_residual(ref: Any, prediction: Prediction, flow: Floats) -> Floats:
     return np.where(valid & ~prediction.masked, r2, np.nan)
 
 
+def _slow_flow_sigma(
+    ref: Any, settings: ScadaSettings, prediction: Prediction, samples: Floats
+) -> float:
+    """
+    Return the sigma of r2 that a sum over many samples shows, by theory.
+
+    The pressure filter cuts the variance of the noise to the share c, but has a gain of 1 for
+    what is slow: there the variance is that of the sensors.
+    """
+    drop = np.maximum(samples[:, 3] - samples[:, 4], 0.02)
+    share = (settings.sigma * prediction.f / (2.0 * drop) / prediction.sq) ** 2
+    fit = ~np.isnan(share) & ~prediction.masked
+    if not fit.any():
+        return 1.0
+    passed = 2.0 - float(ref['pressure']['c'].sum())
+    return math.sqrt(1.0 + passed * float(share[fit].mean()))
+
+
 def _limits(
-    ref: Any, settings: ScadaSettings, r1: Floats, r2: Floats, samples: Floats, wandering: bool
-) -> None:
+    ref: Any, settings: ScadaSettings, r1: Floats, r2: Floats, slow: float, samples: Floats,
+    wandering: bool,
+) -> None:  # fmt: skip
     """Set mu, sigma, allowance and limit of every CUSUM from the budget."""
     n = len(r1)
     arl = arl_per_test(settings)
@@ -207,14 +230,17 @@ def _limits(
         margin = test.wandering if wandering else test.margin
         if r.size < 200 or not margin > 0.0:
             continue
-        sd = max(block_sigma(r, 1), block_sigma(r, test.block))
+        sd = block_sigma(r, 1)
+        if test.residual == R2 and test.block == SLOW:
+            sd *= slow
+        sd = max(sd, block_sigma(r, test.block))
         if not sd > 0.0:  # an input without any noise: nothing to test
             continue
         mu = r.mean()
         if test.k0 == 4.0:
             quantile = NormalDist().inv_cdf(1.0 - 0.25 / n)
             sd *= max(1.0, float(np.abs(r - mu).max()) / sd / quantile)
-        k = test.k0 + (4.0 / math.sqrt(r.size) if test.block > 1 else 0.0)
+        k = test.k0 + STANDARD_ERRORS[test.block] / math.sqrt(r.size)
         clip = test.clip
         if (wandering or n < LONG_RECORD) and test.residual == R1 and test.k0 == 4.0:
             clip = JUMP_CLIP

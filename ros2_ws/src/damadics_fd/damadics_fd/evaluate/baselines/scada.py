@@ -2,13 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """The SCADA-rate monitor as a detector of a campaign, and its residuals with plain tests."""
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import asdict
+from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from damadics_fd.core import scada
 from damadics_fd.core.scada.cusum import TEST_NAMES
 from damadics_fd.core.scada.isolation import Isolation
 from damadics_fd.core.scada.learning import learn
@@ -105,8 +109,16 @@ class Scada(Detector):
         return found
 
     def settings(self) -> dict[str, Any]:
-        """Return the settings of the monitor."""
-        return asdict(self._settings)
+        """Return the settings of the monitor and a digest of its source, which holds margins."""
+        return {**asdict(self._settings), 'source': _source()}
+
+
+@cache
+def _source() -> str:
+    digest = hashlib.sha256()
+    for file in sorted(Path(scada.__path__[0]).glob('*.py')):
+        digest.update(file.read_bytes())
+    return digest.hexdigest()[:12]
 
 
 class ModelThreshold(Detector):
