@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from damadics_fd.bag import kernels
 from damadics_fd.bag.decoder import Columns
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.flags import FlagWriter
@@ -19,7 +18,7 @@ from damadics_fd.bag.recording import Recording, origin
 from damadics_fd.core.alarm import RAISED
 from damadics_fd.core.detector import Detector
 from damadics_fd.core.events import Event
-from damadics_fd.core.pipeline import Result, run
+from damadics_fd.core.pipeline import Result, run, watch
 from damadics_fd.core.quality import REASONS
 from damadics_fd.core.scada.estimator import estimator_for
 from damadics_fd.core.settings import Settings
@@ -75,8 +74,12 @@ class Chain:
         self._estimator, self._detector = estimator_for(settings), Detector(settings)
 
     def take(self, columns: Columns) -> Result:
-        """Judge the next columns."""
+        """Judge the next columns and keep everything."""
         return run(columns, self._settings, self._estimator, self._detector)
+
+    def watch(self, columns: Columns) -> list[Event]:
+        """Judge the next columns and keep the events only."""
+        return watch(columns, self._settings, self._estimator, self._detector)
 
     @property
     def signature(self) -> Signature:
@@ -187,15 +190,16 @@ def _replay(
             if zero is None or first is None:
                 zero, first = origin(int(stamp[0])), int(stamp[0])
             last = int(stamp[-1])
-            result = chain.take(columns)
+            result = chain.take(columns) if flags or thinner else None
+            events = result.events if result else chain.watch(columns)
             spent += time.perf_counter() - began
-            collect(outcome.detections, result.events, zero)
+            collect(outcome.detections, events, zero)
             outcome.samples += len(stamp)
-            if flags:
+            if result and flags:
                 flags.write(result)
-            if thinner:
+            if result and thinner:
                 thinner.add(columns, result)
-            if forces:
+            if result and forces:
                 forces.add(result.estimates[result.accepted])
             progress(len(stamp))
     finally:
@@ -250,6 +254,5 @@ def warm_up(plans: Sequence[Plan]) -> None:
     """Load or compile the loops, so that the first recording is not slower than the next."""
     names = ('cv', 'x1', 'p1', 'p2', 't1', 'flow', 'ps')
     columns: Columns = {name: np.array([0.5]) for name in names}
-    kernels.warm_up()
     for plan in plans:
-        plan.chain().take({'stamp': np.array([1]), **columns})
+        plan.chain().watch({'stamp': np.array([1]), **columns})

@@ -20,6 +20,7 @@ from .test_bag_replay import stroke
 
 pytestmark = needs_messages
 
+PACKAGES = ('@mcap/core@2.2.2', 'fzstd@0.1.1')
 NODE_SCRIPT = """
 const { McapIndexedReader, McapStreamReader } = require('@mcap/core');
 const zstd = require('fzstd');
@@ -61,26 +62,38 @@ const { open } = require('fs/promises');
 """  # noqa: E501
 
 
-def test_the_reference_reader_of_mcap_in_typescript_agrees(tmp_path):
-    """Its packages: npm install @mcap/core fzstd, and NODE_PATH where they are not found."""
-    node = shutil.which('node')
-    if not node:
+@pytest.fixture
+def node(tmp_path):
+    """Return a function that runs a script with the packages, which npm fetches if need be."""
+    program, npm = shutil.which('node'), shutil.which('npm')
+    if not program:
         pytest.skip('node is not installed')
-    places = [os.environ.get('NODE_PATH', ''), str(Path(__file__).parents[4] / 'node_modules')]
-    env = os.environ | {'NODE_PATH': os.pathsep.join(filter(None, places))}
-    known = subprocess.run(
-        [node, '-e', "require('@mcap/core'); require('fzstd')"], env=env, capture_output=True,
-    )
-    if known.returncode:
-        pytest.skip('npm packages @mcap/core and fzstd are not installed')
+    env = dict(os.environ)
+    probe = [program, '-e', "require('@mcap/core'); require('fzstd')"]
+    if subprocess.run(probe, env=env, capture_output=True).returncode:
+        if not npm:
+            pytest.skip('npm is not installed, nor are @mcap/core and fzstd in NODE_PATH')
+        install = [npm, 'install', '--prefix', str(tmp_path), '--no-audit', '--no-fund', *PACKAGES]
+        try:
+            done = subprocess.run(install, capture_output=True, text=True, timeout=60)
+        except subprocess.TimeoutExpired:
+            pytest.skip('the npm registry does not answer')
+        if done.returncode:
+            pytest.skip(f'npm install {" ".join(PACKAGES)}: {done.stderr.strip()[-200:]}')
+        env['NODE_PATH'] = str(tmp_path / 'node_modules')
+
+    def run(*arguments):
+        return subprocess.run([program, *map(str, arguments)], env=env, check=True,
+                              capture_output=True, text=True, timeout=100).stdout
+
+    return run
+
+
+def test_the_reference_reader_of_mcap_in_typescript_agrees(tmp_path, node):
     columns = simulated(20_000)
     write_columns(tmp_path / 'a.mcap', columns, frame_id='LC74_20')
     (tmp_path / 'read.js').write_text(NODE_SCRIPT)
-    answer = subprocess.run(
-        [node, str(tmp_path / 'read.js'), str(tmp_path / 'a.mcap')], env=env, check=True,
-        capture_output=True, text=True, timeout=100,
-    )
-    found = json.loads(answer.stdout)
+    found = json.loads(node(tmp_path / 'read.js', tmp_path / 'a.mcap'))
     assert found['profile'] == 'ros2'
     assert found['values'] == columns['x1'].tolist()
     assert [int(stamp) for stamp in found['stamps']] == columns['stamp'].tolist()

@@ -5,11 +5,11 @@
 import csv
 import json
 import re
-from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 import pytest
+from damadics_fd import replay_output
 from damadics_fd.bag import BagError, BagWriter, read_columns, write_columns
 from damadics_fd.bag.recording import find_recordings, parse_maps
 from damadics_fd.bag.tables import LUBLIN
@@ -183,19 +183,33 @@ def test_errors_are_one_line_on_stderr(args, reason, tmp_path, capsys, monkeypat
 
 
 @needs_messages
-def test_parquet_is_written_or_refused_at_once(tmp_path, capsys):
+def test_every_format_tells_the_same(tmp_path):
+    parquet = pytest.importorskip('pyarrow.parquet')
+    write_columns(tmp_path / 'a.mcap', stroke())
+    for suffix in ('json', 'csv', 'parquet'):
+        arguments = [str(tmp_path / 'a.mcap'), '--mode', 'paper', '--out']
+        assert main([*arguments, str(tmp_path / f'a.{suffix}')]) == 0
+    (result,) = json.loads((tmp_path / 'a.json').read_text())
+    with (tmp_path / 'a.csv').open() as file:
+        lines = list(csv.DictReader(file))
+    rows = parquet.read_table(tmp_path / 'a.parquet').to_pylist()
+    assert len(result['detections']) == len(lines) == len(rows) > 1
+    for detection, line, row in zip(result['detections'], lines, rows, strict=True):
+        assert detection.items() <= row.items()
+        assert (row['bag'], row['mode'], row['samples']) == (result['bag'], 'paper', 12_000)
+        assert {name: '' if value is None else str(value) for name, value in row.items()
+                if name != 'samples_per_s'} == {
+            name: value for name, value in line.items() if name != 'samples_per_s'}
+
+
+@needs_messages
+def test_parquet_without_its_library_is_refused_at_once(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(replay_output, 'find_spec', lambda name: None)
     write_columns(tmp_path / 'a.mcap', stroke(2000))
     out = tmp_path / 'a.parquet'
-    code = main([str(tmp_path / 'a.mcap'), '--mode', 'paper', '--out', str(out)])
-    if find_spec('pyarrow') is None:
-        assert code == 1
-        assert 'pip install pyarrow' in capsys.readouterr().err
-    else:
-        from pyarrow import parquet
-
-        table = parquet.read_table(out)
-        assert table.num_rows > 0
-        assert set(table.column('mode').to_pylist()) == {'paper'}
+    assert main([str(tmp_path / 'a.mcap'), '--mode', 'paper', '--out', str(out)]) == 1
+    assert 'pip install pyarrow' in capsys.readouterr().err
+    assert not out.exists()
 
 
 def test_maps_name_signal_source_and_factor():

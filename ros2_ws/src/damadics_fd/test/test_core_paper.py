@@ -8,9 +8,10 @@ import sys
 
 import numpy as np
 import pytest
+from damadics_fd.core import pipeline
 from damadics_fd.core.detector import Detector
 from damadics_fd.core.estimator import Estimator
-from damadics_fd.core.pipeline import run
+from damadics_fd.core.pipeline import run, watch
 from damadics_fd.core.settings import Settings
 
 
@@ -63,6 +64,22 @@ def test_chunks_agree_with_the_whole():
     joined = np.concatenate([first.decisions, second.decisions])
     for name in joined.dtype.names:  # not the bytes: there is padding between the fields
         np.testing.assert_array_equal(joined[name], whole.decisions[name])
+
+
+@pytest.mark.parametrize('mode', ['paper', 'monitor'])
+def test_watching_gives_the_events_and_the_states_of_a_run(mode, monkeypatch):
+    settings = Settings.for_mode(mode, sample_rate=400.0)
+    columns = recording()
+    columns['x1'][1500:] += np.where(np.arange(2500) % 40 < 20, 0.2, 0.0)
+    result = run(columns, settings)
+    assert len(result.events) > 5 or mode == 'monitor'
+    monkeypatch.setattr(pipeline, 'ROOM', 3)  # several turns
+    estimator, detector = Estimator(settings), Detector(settings)
+    assert watch(columns, settings, estimator, detector) == result.events
+    assert estimator.counters == result.counters
+    for mine, other in ((estimator, result.estimator), (detector, result.detector),
+                        (detector.signature, result.detector.signature)):
+        assert mine.state.tobytes() == other.state.tobytes()
 
 
 def test_core_imports_no_ros_package():

@@ -4,6 +4,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,8 @@ from damadics_fd.core.jit import jit
 from damadics_fd.core.quality import REASONS, SIGNALS
 from damadics_fd.core.scada.estimator import ScadaEstimator, estimator_for
 from damadics_fd.core.settings import Settings
+
+ROOM = 64  # decisions with a transition that `watch` takes from the loop at once
 
 
 @dataclass(frozen=True)
@@ -77,9 +80,9 @@ class Result:
 
 @jit
 def loop(q: NDArray, s: NDArray, ds: NDArray, c: NDArray, g: NDArray, gc: NDArray,
-         stamp: NDArray, cv: NDArray, x1: NDArray, p1: NDArray, p2: NDArray, t1: NDArray,
-         flow: NDArray, ps: NDArray, reason: NDArray, estimates: NDArray,
-         decisions: NDArray) -> None:
+         first: int, stamp: NDArray, cv: NDArray, x1: NDArray, p1: NDArray, p2: NDArray,
+         t1: NDArray, flow: NDArray, ps: NDArray, keep: bool, reason: NDArray,
+         estimates: NDArray, decisions: NDArray) -> tuple[int, int]:
     """
     Run `estimator.step` and `detector.step` over columns.
 
@@ -89,6 +92,7 @@ def loop(q: NDArray, s: NDArray, ds: NDArray, c: NDArray, g: NDArray, gc: NDArra
     :param c: settings.
     :param g: state of the signature.
     :param gc: settings of the signature.
+    :param first: sample to begin with.
     :param stamp: stamps [ns].
     :param cv: control values.
     :param x1: positions.
@@ -97,15 +101,26 @@ def loop(q: NDArray, s: NDArray, ds: NDArray, c: NDArray, g: NDArray, gc: NDArra
     :param t1: temperatures.
     :param flow: flows.
     :param ps: chamber pressures.
+    :param keep: keep a row for each sample; otherwise only decisions with a transition, as many
+        as there is room for, and no more than one row of the others is used.
     :param reason: written: 0 or the reason of refusal.
-    :param estimates: written.
+    :param estimates: written; rows of refused samples stay as they are.
     :param decisions: written; rows of refused samples stay as they are.
+    :return: the sample after the last one, and the number of decisions with a transition.
     """
-    for i in range(len(stamp)):
-        reason[i] = estimation.step(q[0], s[0], c[0], estimates[i], stamp[i], cv[i], x1[i], p1[i],
-                                    p2[i], t1[i], flow[i], ps[i])
-        if reason[i] == 0:
-            detecting.step(ds[0], c[0], g[0], gc[0], estimates[i], decisions[i])
+    kept = 0
+    for i in range(first, len(stamp)):
+        row = i if keep else 0
+        reason[row] = estimation.step(q[0], s[0], c[0], estimates[row], stamp[i], cv[i], x1[i],
+                                      p1[i], p2[i], t1[i], flow[i], ps[i])
+        if reason[row] == 0:
+            d = decisions[i if keep else kept]
+            detecting.step(ds[0], c[0], g[0], gc[0], estimates[row], d)
+            if d.transitions != 0:
+                kept += 1
+                if not keep and kept == len(decisions):
+                    return i + 1, kept
+    return len(stamp), kept
 
 
 def run(columns: Mapping[str, NDArray[Any]], settings: Settings,
@@ -124,6 +139,60 @@ def run(columns: Mapping[str, NDArray[Any]], settings: Settings,
     """
     estimator = estimator or estimator_for(settings)
     detector = detector or Detector(settings)
+    stamp, signals = _contiguous(columns)
+    reason = np.empty(len(stamp), np.uint8)
+    estimates = np.empty(len(stamp), ESTIMATE)
+    decisions = np.empty(len(stamp), DECISION)
+    if isinstance(estimator, ScadaEstimator):
+        _run_scada(estimator, detector, stamp, signals, reason, estimates, decisions)
+    else:
+        cv, x1, p1, p2, t1, flow, ps = signals
+        loop(estimator.quality, estimator.state, detector.state, _record(settings),
+             detector.signature.state, detector.signature.record, 0, stamp, cv, x1, p1, p2, t1,
+             flow, ps, True, reason, estimates, decisions)
+    _blank(reason, stamp, estimates, decisions)
+    return Result(reason, estimates, decisions, estimator, detector)
+
+
+def watch(columns: Mapping[str, NDArray[Any]], settings: Settings, estimator: Estimator,
+          detector: Detector) -> list[Event]:
+    """
+    Run a recording like `run`, but keep nothing of it but the transitions of the alarm.
+
+    :param columns: as for `run`.
+    :param settings: all settings.
+    :param estimator: the estimator to go on with.
+    :param detector: the detector to go on with.
+    :return: events in order of time.
+    :raises KeyError: as `run`.
+    :raises ValueError: as `run`.
+    """
+    if isinstance(estimator, ScadaEstimator):
+        return run(columns, settings, estimator, detector).events
+    stamp, (cv, x1, p1, p2, t1, flow, ps) = _contiguous(columns)
+    reason, estimate = np.empty(1, np.uint8), np.empty(1, ESTIMATE)
+    decisions = np.empty(ROOM, DECISION)
+    events: list[Event] = []
+    first = 0
+    while first < len(stamp):
+        first, kept = loop(
+            estimator.quality, estimator.state, detector.state, _record(settings),
+            detector.signature.state, detector.signature.record, first, stamp, cv, x1, p1, p2, t1,
+            flow, ps, False, reason, estimate, decisions)
+        events += [event for decision in decisions[:kept] for event in events_of(decision)]
+    return events
+
+
+@lru_cache(maxsize=16)
+def _record(settings: Settings) -> NDArray[Any]:
+    """Return the settings for the loop; made once for all pieces of a recording."""
+    return settings.record()
+
+
+def _contiguous(
+    columns: Mapping[str, NDArray[Any]],
+) -> tuple[NDArray[np.int64], list[NDArray[np.float64]]]:
+    """Return stamps and signals as the loop takes them; copy only what is otherwise."""
     missing = [name for name in ('stamp', 'cv', 'x1') if name not in columns]
     if missing:
         raise KeyError(f'the recording has no column {", ".join(missing)}')
@@ -133,19 +202,7 @@ def run(columns: Mapping[str, NDArray[Any]], settings: Settings,
                for name in SIGNALS]
     if any(signal.shape != stamp.shape for signal in signals):
         raise ValueError('the columns of the recording differ in length')
-    reason = np.zeros(len(stamp), np.uint8)
-    estimates = np.zeros(len(stamp), ESTIMATE)
-    decisions = np.zeros(len(stamp), DECISION)
-    if isinstance(estimator, ScadaEstimator):
-        _run_scada(estimator, detector, stamp, signals, reason, estimates, decisions)
-        _blank(reason, stamp, estimates, decisions)
-        return Result(reason, estimates, decisions, estimator, detector)
-    cv, x1, p1, p2, t1, flow, ps = signals
-    loop(estimator.quality, estimator.state, detector.state, settings.record(),
-         detector.signature.state, detector.signature.record, stamp, cv, x1, p1, p2, t1, flow, ps,
-         reason, estimates, decisions)
-    _blank(reason, stamp, estimates, decisions)
-    return Result(reason, estimates, decisions, estimator, detector)
+    return stamp, signals
 
 
 def _run_scada(estimator: ScadaEstimator, detector: Detector, stamp: NDArray[np.int64],
@@ -154,6 +211,7 @@ def _run_scada(estimator: ScadaEstimator, detector: Detector, stamp: NDArray[np.
     rows = zip(stamp.tolist(), *(signal.tolist() for signal in signals), strict=True)
     for i, row in enumerate(rows):
         estimate = estimator.update(*row)
+        reason[i] = 0
         if estimate is None:
             reason[i] = REASONS.index(estimator.last_rejection.split(':')[0])
             continue
@@ -163,8 +221,12 @@ def _run_scada(estimator: ScadaEstimator, detector: Detector, stamp: NDArray[np.
 
 def _blank(reason: NDArray[np.uint8], stamp: NDArray[np.int64], estimates: NDArray[Any],
            decisions: NDArray[Any]) -> None:
+    """Fill the rows of refused samples."""
     refused = np.flatnonzero(reason)
+    if not len(refused):
+        return
     for rows in (estimates, decisions):
+        rows[refused] = np.zeros(1, rows.dtype)
         for name in rows.dtype.names or ():
             if rows.dtype[name].kind == 'f':
                 rows[name][refused] = np.nan
