@@ -131,10 +131,10 @@ import sys, time, rclpy
 from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
 from damadics_msgs.msg import Measurement
-topic, rate, seconds = sys.argv[1], float(sys.argv[2]), float(sys.argv[3])
+topic, rate, seconds, depth = sys.argv[1], *map(float, sys.argv[2:5])
 rclpy.init()
 node = rclpy.create_node('source' + topic.replace('/', '_'))
-publisher = node.create_publisher(Measurement, topic, QoSProfile(depth=20000))
+publisher = node.create_publisher(Measurement, topic, QoSProfile(depth=int(depth)))
 message = Measurement()
 message.header.frame_id = 'LC74_20'
 raw = serialize_message(message)
@@ -155,21 +155,28 @@ time.sleep(2.0)
 """
 
 
-def recorder(folder: Path, rate: float, seconds: float, publishers: int) -> None:
+def recorder(folder: Path, options: argparse.Namespace) -> None:
     """Messages from other processes into a bag: how many, how many lost."""
     env = os.environ | {'ROS_DOMAIN_ID': str(random.randrange(1, 100)),
                         'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
-    bag = folder / 'recorded'
+    bag, publishers, seconds = folder / 'recorded', options.publishers, options.seconds
+    burners = [subprocess.Popen([sys.executable, '-S', '-c', 'while True: pass'])
+               for _ in range(options.burners)]
     node = subprocess.Popen(
-        [sys.executable, '-m', 'damadics_fd.recorder', '--out', str(bag)], env=env,
+        ['nice', '-n', str(options.nice), sys.executable, '-m', 'damadics_fd.recorder', '--out',
+         str(bag)], env=env,
     )
-    time.sleep(3.0)
+    time.sleep(3.0 + options.burners)
+    share = [str(value) for value in (options.rate / publishers, seconds, options.depth)]
     sources = [
-        subprocess.Popen([sys.executable, '-c', PUBLISHER, f'/m{i}', str(rate / publishers),
-                          str(seconds)], env=env, stdout=subprocess.PIPE, text=True)
+        subprocess.Popen([sys.executable, '-c', PUBLISHER, f'/m{i}', *share], env=env,
+                         stdout=subprocess.PIPE, text=True)
         for i in range(publishers)
     ]
     answers = [source.communicate()[0].split() for source in sources]
+    for burner in burners:
+        burner.kill()
+        burner.wait()
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     node.send_signal(signal.SIGTERM)
     node.wait()
@@ -188,11 +195,14 @@ def main() -> None:
     parser.add_argument('--rate', type=float, default=20_000.0, help='messages per second')
     parser.add_argument('--seconds', type=float, default=60.0)
     parser.add_argument('--publishers', type=int, default=2)
+    parser.add_argument('--depth', type=int, default=20_000, help='history of a publisher')
+    parser.add_argument('--burners', type=int, default=0, help='processes that keep a core busy')
+    parser.add_argument('--nice', type=int, default=0, help='niceness of the recorder')
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         if options.recorder:
-            recorder(folder, options.rate, options.seconds, options.publishers)
+            recorder(folder, options)
             return
         reading(folder)
         replaying(folder)

@@ -73,13 +73,17 @@ def main(args: list[str] | None = None) -> int:
         node = Recorder(spool, options.topics)
         print(f'recording {" ".join(node.topics)} into {bag.path}', flush=True)
         _spin(node, spool, stop)
+        node.look()
         spool.close()
     except (BagError, OSError) as error:
         print(f'recorder: {error}', file=sys.stderr)
         return 1
     finally:
         rclpy.try_shutdown()
-    lost = f', {spool.dropped} dropped' if spool.dropped else ''
+    lost = ''.join(
+        f', {count} {what}' for count, what in
+        ((sum(node.lost.values()), 'lost on the way'), (spool.dropped, 'dropped')) if count
+    )
     print(f'recorded {sum(bag.counts.values())} messages{lost}, {bag.size} bytes: {bag.path}')
     return int(bool(spool.dropped))
 

@@ -4,6 +4,7 @@
 
 import os
 import random
+import re
 import signal
 import subprocess
 import sys
@@ -19,7 +20,9 @@ from .bag_support import needs_messages
 
 rclpy = pytest.importorskip('rclpy')
 pytest.importorskip('damadics_msgs.msg')
+from damadics_fd.ros.sequence import Sequence  # noqa: E402
 from damadics_msgs.msg import FaultFlag, Float64Stamped, Measurement  # noqa: E402
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
 
 pytestmark = [pytest.mark.ros, needs_messages]
@@ -113,6 +116,67 @@ def test_every_message_is_in_the_bag_when_a_signal_ends_it(graph, tmp_path, numb
     metadata = (tmp_path / 'bag' / 'metadata.yaml').read_text()
     assert 'durability: transient_local' in metadata
     assert '/estimate' not in metadata  # nobody published it
+
+
+def test_messages_lost_on_the_way_are_counted(graph, tmp_path):
+    process = graph.record('--out', tmp_path / 'bag')
+    shallow = graph.node.create_publisher(Float64Stamped, 'shallow', QoSProfile(depth=5))
+    told = []
+    graph.node.create_subscription(DiagnosticArray, '/diagnostics', told.append, 10)
+    deadline = time.monotonic() + 30
+    while shallow.get_subscription_count() == 0:
+        assert time.monotonic() < deadline, 'the recorder does not subscribe'
+        time.sleep(0.02)
+    time.sleep(0.5)
+    message = Float64Stamped(data=1.0)
+    for _ in range(20):
+        shallow.publish(message)
+        time.sleep(0.01)
+    process.send_signal(signal.SIGSTOP)  # held up: the publisher forgets what it cannot deliver
+    time.sleep(0.1)
+    for _ in range(30_000):
+        shallow.publish(message)
+    process.send_signal(signal.SIGCONT)
+    for _ in range(100):
+        time.sleep(0.01)
+        shallow.publish(message)
+    deadline = time.monotonic() + 20
+    executor = rclpy.executors.SingleThreadedExecutor(context=graph.context)
+    executor.add_node(graph.node)
+    while not (told and 'lost' in told[-1].status[0].message) and time.monotonic() < deadline:
+        executor.spin_once(timeout_sec=0.2)
+    process.terminate()
+    out, error = process.communicate(timeout=20)
+    assert process.returncode == 0, error
+    recorded = len(read_columns(tmp_path / 'bag', '/shallow')['data'])
+    lost = int(re.search(r'(\d+) lost on the way', out)[1])
+    assert lost > 1000
+    assert recorded + lost == 30_120
+    status = told[-1].status[0]
+    assert status.level == DiagnosticStatus.WARN
+    values = {value.key: value.value for value in status.values}
+    assert int(values['Messages lost on /shallow']) == lost
+
+
+def test_numbers_count_only_where_one_publisher_gave_them():
+    sequence = Sequence()
+    for number in (7, 8, 11):
+        sequence.note(number)
+    sequence.settle([b'a'])  # of whom the first ones are is not known
+    assert sequence.lost == 0
+    for number in (12, 15, 16):
+        sequence.note(number)
+    sequence.settle([b'a'])
+    assert sequence.lost == 2
+    for number in (17, 3, 18):
+        sequence.note(number)
+    sequence.settle([b'a', b'b'])
+    assert sequence.lost == 2
+    sequence.settle([b'b'])
+    for number in (4, 9):
+        sequence.note(number)
+    sequence.settle([])  # it has gone, and nobody else came
+    assert sequence.lost == 6
 
 
 def test_a_killed_recorder_loses_at_most_a_second(graph, tmp_path):

@@ -53,11 +53,11 @@ def test_a_full_disk_is_told_and_costs_nothing_once_there_is_room(tmp_path, monk
     spool = Spool(bag)
     topic = bag.add_topic('/a', 'std_msgs/msg/Float64')
     for i in range(500):
-        spool.put((topic, number(i), i))
+        spool.put((topic, number(i), i, i))
     wait_until(lambda: spool.waiting == 0)
     disk.free = 100
     for i in range(500, 1000):
-        spool.put((topic, number(i), i))
+        spool.put((topic, number(i), i, i))
     wait_until(lambda: 'No space left' in spool.error)
     disk.free = 1 << 60
     wait_until(lambda: not spool.error and not spool.waiting)
@@ -74,11 +74,11 @@ def test_the_queue_is_bounded_while_the_disk_is_full(tmp_path, monkeypatch):
     spool = Spool(bag, most_waiting=100)
     topic = bag.add_topic('/a', 'std_msgs/msg/Float64')
     for i in range(100):
-        spool.put((topic, number(i), i))
+        spool.put((topic, number(i), i, i))
     wait_until(lambda: spool.waiting == 0)
     disk.free = 0
     for i in range(100, 5000):
-        spool.put((topic, number(i), i))
+        spool.put((topic, number(i), i, i))
     wait_until(lambda: spool.error and spool.waiting <= 100)
     assert spool.dropped > 4000
     disk.free = 1 << 60

@@ -11,7 +11,7 @@ from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.rosbag2 import Topic
 from damadics_fd.bag.writer import BagWriter
 
-Item = tuple[Topic, bytes, int]  # topic, serialised message, log time [ns]
+Item = tuple[Topic, bytes, int, int]  # topic, serialised message, log and publish time [ns]
 
 PERIOD = 0.05  # [s] between two looks at the queue
 RETRY_PERIOD = 1.0  # [s] between two attempts while the disk refuses
@@ -71,9 +71,9 @@ class Spool:
                 self.bag.flush()
                 self.error = ''
             for _ in range(len(self._queue)):
-                topic, data, log_time = self._queue.popleft()
+                message = self._queue.popleft()
                 self.taken += 1
-                self.bag.write(topic, data, log_time, log_time)
+                self.bag.write(*message)
             self.bag.flush_if_due()
         except (OSError, BagError) as error:
             reason = error.strerror if isinstance(error, OSError) else error.reason

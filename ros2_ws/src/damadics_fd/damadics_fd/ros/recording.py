@@ -3,11 +3,12 @@
 """The recorder node: raw subscriptions to topics as they appear."""
 
 import importlib
+import inspect
 import shutil
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.event_handler import SubscriptionEventCallbacks
@@ -19,6 +20,7 @@ from damadics_fd.bag import rosbag2
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.rosbag2 import Topic
 from damadics_fd.bag.spool import Spool
+from damadics_fd.ros.sequence import Sequence
 
 DEPTH = 100_000  # messages that may wait in the middleware while this process is held up
 LOOK_PERIOD = 0.1  # [s] between two looks at the graph
@@ -40,6 +42,7 @@ class Recorded(NamedTuple):
     subscription: Subscription
     reliable: bool
     latched: bool
+    sequence: Sequence
 
 
 def describe(profile: QoSProfile) -> rosbag2.QosProfile:
@@ -86,8 +89,8 @@ class Recorder(Node):
             if not self._wanted or full in self._wanted:
                 self._record(full, kind, True, latched)
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
-        self._look()
-        self.create_timer(LOOK_PERIOD, self._look)
+        self.look()
+        self.create_timer(LOOK_PERIOD, self.look)
         self.create_timer(1.0, self._report)
 
     @property
@@ -95,8 +98,8 @@ class Recorder(Node):
         """Names of the topics that are recorded."""
         return sorted(self._recorded)
 
-    def _look(self) -> None:
-        """Subscribe to topics that have appeared, as their publishers offer them."""
+    def look(self) -> None:
+        """Subscribe to topics that have appeared, as their publishers offer them; count losses."""
         for name, kinds in self.get_topic_names_and_types():
             if name in self._refused or (self._wanted and name not in self._wanted):
                 continue
@@ -117,7 +120,9 @@ class Recorder(Node):
             if not known:
                 self._record(name, kind, reliable, latched)
             if name in self._recorded:
-                self._recorded[name].topic.offered_qos = [describe(offer) for offer in offers]
+                found = self._recorded[name]
+                found.topic.offered_qos = [describe(offer) for offer in offers]
+                found.sequence.settle(bytes(info.endpoint_gid) for info in infos)
 
     def _refuse(self, name: str, reason: str) -> None:
         self._refused.add(name)
@@ -131,17 +136,24 @@ class Recorder(Node):
         except (ImportError, AttributeError, BagError) as error:
             self._refuse(name, str(error))
             return
-        put, now = self._spool.put, self._now
+        put, now, sequence = self._spool.put, self._now, self._sequence(name)
         first = True
 
-        def receive(data: bytes) -> None:
+        def receive(*given: Any) -> None:
             nonlocal first
+            # rclpy 7.1.6 hands message and info over as one pair in this executor
+            data, info = given if len(given) == 2 else given[0]
             if first:  # the channel is written with the first message: who publishes it?
                 first = False
                 infos = self.get_publishers_info_by_topic(name)
                 topic.offered_qos = [describe(info.qos_profile) for info in infos]
-            put((topic, data, now()))
+            number = info['publication_sequence_number']
+            if number is not None:
+                sequence.note(number)
+            logged = now()
+            put((topic, data, logged, info['source_timestamp'] or logged))
 
+        receive.__signature__ = inspect.signature(lambda message, info: None)  # type: ignore[attr-defined]
         # no event of the middleware, not even the default ones: taking one can block for ever
         # in this executor while messages arrive (seen in rclpy 7.1.6, message_lost)
         events = SubscriptionEventCallbacks(use_default_callbacks=False)
@@ -149,10 +161,18 @@ class Recorder(Node):
             message_type, name, receive, matching(reliable, latched), raw=True,
             event_callbacks=events,
         )
-        self._recorded[name] = Recorded(topic, subscription, reliable, latched)
+        self._recorded[name] = Recorded(topic, subscription, reliable, latched, sequence)
+
+    def _sequence(self, name: str) -> Sequence:
+        return self._recorded[name].sequence if name in self._recorded else Sequence()
+
+    @property
+    def lost(self) -> dict[str, int]:
+        """Messages that never arrived, by topic."""
+        return {name: recorded.sequence.lost for name, recorded in self._recorded.items()}
 
     def _report(self) -> None:
-        """Publish what is recorded, waiting and dropped."""
+        """Publish what is recorded, waiting, lost and dropped."""
         spool, bag = self._spool, self._spool.bag
         status = DiagnosticStatus(
             name='recorder: bag', hardware_id=str(bag.path), level=DiagnosticStatus.OK,
@@ -161,6 +181,9 @@ class Recorder(Node):
         if spool.error or spool.dropped:
             status.level = DiagnosticStatus.ERROR
             status.message = f'cannot write: {spool.error}' if spool.error else 'messages dropped'
+        elif any(self.lost.values()):
+            status.level = DiagnosticStatus.WARN
+            status.message = f'{sum(self.lost.values())} messages lost on the way'
         elif self._refused:
             status.level = DiagnosticStatus.WARN
             status.message = 'topics refused'
@@ -169,6 +192,7 @@ class Recorder(Node):
             'Messages dropped': spool.dropped, 'Free disk (B)': free_bytes(bag.path),
             'Topics refused': ' '.join(sorted(self._refused)),
             **{f'Messages on {name}': count for name, count in bag.counts.items()},
+            **{f'Messages lost on {name}': count for name, count in self.lost.items() if count},
         }
         status.values = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
         message = DiagnosticArray(status=[status])
