@@ -4,6 +4,7 @@
 
 import time
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -61,6 +62,24 @@ class Peer:
         self.executor.shutdown()
         self.node.destroy_node()
         self.context.try_shutdown()
+
+
+class Child(NamedTuple):
+    """A process that another one has started."""
+
+    name: str
+    valve: str
+    pid: int
+
+
+def children(process: int) -> list[Child]:
+    """List what a process, such as `run`, has started."""
+    found = []
+    for number in Path(f'/proc/{process}/task/{process}/children').read_text().split():
+        words = Path(f'/proc/{number}/cmdline').read_bytes().decode().split('\0')
+        valve = next((w.removeprefix('__ns:=/') for w in words if w.startswith('__ns:=')), '')
+        found.append(Child(Path(words[1]).name, valve, int(number)))
+    return found
 
 
 def alone(patch: pytest.MonkeyPatch, folder: Path) -> int:

@@ -17,7 +17,7 @@ from types import SimpleNamespace
 import pytest
 import website
 import yaml
-from conftest import Peer, alone
+from conftest import Peer, alone, children
 from damadics_bringup.processes import Processes, executable, surroundings
 from damadics_fd.ros import qos
 from damadics_msgs.msg import FaultEvent, FaultFlag
@@ -25,7 +25,6 @@ from damadics_msgs.srv import InjectFault
 
 pytestmark = pytest.mark.ros
 VALVE = 'lv101'
-ALARM = ('M', 'S', 'F')
 FRICTION = 4  # f4, servomotor and stem friction
 LUBLIN = Path(__file__).resolve().parents[2] / 'shared/data/lublin_actuator3_20min_1hz.csv'
 LEARNED = 900.0  # s, the end of learning in mode scada
@@ -62,17 +61,11 @@ def first(tmp_path_factory, chromium):
             website.wait_until_served(address)
             yield SimpleNamespace(
                 peer=peer, flags=flags, events=events, processes=processes, folder=folder,
-                bag=folder / 'bag', tile=website.Tile(address, VALVE, chromium))
+                bag=folder / 'bag',
+                tile=website.Tile(address, VALVE, chromium and chromium.new_page()))
             if not processes.ended('run'):
                 processes.end('run', 90.0)
         peer.close()
-
-
-def children(process: int) -> dict[str, int]:
-    """Return the processes that a process has started: number by name of the executable."""
-    numbers = Path(f'/proc/{process}/task/{process}/children').read_text().split()
-    words = {n: Path(f'/proc/{n}/cmdline').read_bytes().decode().split('\0') for n in numbers}
-    return {Path(w).name: int(n) for n, line in words.items() for w in line[1:2]}
 
 
 def rises(first) -> list[int]:
@@ -106,17 +99,18 @@ def test_one_command_shows_a_friction_fault(first):
     assert first.peer.wait(answer.done)
     assert answer.result().success
     assert first.peer.wait(lambda: first.flags[-1].fault, 30.0), 'the friction is not flagged'
-    assert first.tile.wait(ALARM, 5.0) < 1.0
+    assert first.tile.wait(website.ALARM, 5.0) < 1.0
     assert first.peer.wait(lambda: rises(first))
 
 
 def test_a_killed_detector_greys_the_tile_and_its_alarm_comes_back(first):
     occurrence = first.flags[-1].occurrence
-    os.kill(children(first.processes.pid('run'))['detector'], signal.SIGKILL)
+    run = children(first.processes.pid('run'))
+    os.kill(next(child.pid for child in run if child.name == 'detector'), signal.SIGKILL)
     assert first.tile.wait(('off',), 5.0) < 1.0
     first.peer.wait(lambda: False, 0.3)
     before = len(first.flags)
-    first.tile.wait(ALARM, 60.0)  # `run` has started it again
+    first.tile.wait(website.ALARM, 60.0)  # `run` has started it again
     assert first.peer.wait(lambda: len(first.flags) > before + 2, 30.0)
     assert all(flag.fault for flag in first.flags[before:]), 'the alarm was lost'
     assert {flag.occurrence for flag in first.flags[before:]} == {occurrence}
@@ -126,9 +120,10 @@ def test_the_recorded_bag_gives_the_same_flag_time(first):
     first.peer.wait(lambda: False, 3.0)
     assert len(rises(first)) == 1, 'the restart raised an alarm'
     started = children(first.processes.pid('run'))
-    assert set(started) == {'recorder', 'estimator', 'detector', 'plant', 'dashboard'}
+    assert {child.name for child in started} == {
+        'recorder', 'estimator', 'detector', 'plant', 'dashboard'}
     first.processes.end('run', 90.0)
-    left = [name for name, number in started.items() if Path(f'/proc/{number}').exists()]
+    left = [child for child in started if Path(f'/proc/{child.pid}').exists()]
     assert not left, 'processes are left'
     (result,) = replayed(first.bag, *QUICKLY)
     assert result['detections'][0]['stamp'] == rises(first)[0]

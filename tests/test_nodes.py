@@ -124,17 +124,22 @@ def test_a_node_alone_says_what_it_waits_for(processes, name):
     processes.end(name)
 
 
-@pytest.mark.parametrize('name', ['estimator', 'detector', 'recorder'])
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
-def test_signals_end_a_node_with_exit_code_0(domain, tmp_path, name, number):
+@pytest.mark.parametrize('name', ['estimator', 'detector', 'recorder', 'plant'])
+@pytest.mark.parametrize('numbers', [
+    (signal.SIGINT,), (signal.SIGTERM,), (signal.SIGINT, signal.SIGINT),
+], ids=['Ctrl-C', 'kill', 'launch'])  # launch passes a Ctrl-C on that has reached the node before
+def test_signals_end_a_node_with_exit_code_0(domain, tmp_path, name, numbers):
     arguments = ['--all', '--out', str(tmp_path / 'bag')] if name == 'recorder' else []
+    package = 'damadics_plant' if name == 'plant' else 'damadics_fd'
     process = subprocess.Popen(
-        [executable('damadics_fd', name), *arguments],
+        [executable(package, name), *arguments],
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, env={**os.environ, **SPEAK_AT_ONCE},
     )
     try:
         assert process.stdout.readline(), 'the node did not start'
-        process.send_signal(number)
+        for number in numbers:
+            process.send_signal(number)
+            time.sleep(0.005)
         began = time.monotonic()
         assert process.wait(5.0) == 0
         assert time.monotonic() - began < 2.0

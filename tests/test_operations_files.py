@@ -16,7 +16,7 @@ from types import ModuleType, SimpleNamespace
 import pytest
 import yaml
 from ament_index_python.packages import get_package_share_directory
-from damadics_bringup.fleet import TOPICS, FleetError, read_fleet
+from damadics_bringup.fleet import FleetError, read_fleet
 from damadics_bringup.launcher import tasks_of
 from damadics_bringup.processes import executable, parameters
 from damadics_msgs import msg
@@ -142,14 +142,55 @@ def test_the_layouts_name_topics_and_fields_that_exist():
         assert field in fields(topic), f'{topic}.{field}'
 
 
-def test_the_policy_names_topics_that_exist():
-    tree = ET.parse(SHARE / 'config' / 'policy.xml')
-    allowed = {t.text.rsplit('/', 1)[-1] for t in tree.iter('topic')}
-    others = {'diagnostics', 'rosout', 'parameter_events', 'clock', 'transition_event'}
-    assert allowed - others <= set(TOPICS)
-    flag = [p.get('node') for p in tree.iter('profile')
-            for t in p.findall('topics[@publish]/topic') if t.text == 'fault_flag']
-    assert flag == ['detector'], 'nobody else may raise a flag'
+@pytest.fixture(scope='module')
+def secured(tmp_path_factory):
+    """The policy of the shipped fleet, with one topic elsewhere on the plant."""
+    folder = tmp_path_factory.mktemp('policy')
+    fleet = yaml.safe_load((SHARE / 'config' / 'fleet.yaml').read_text())
+    for valve in fleet['valves'].values():
+        del valve['parameters']
+    fleet['valves']['fv203']['topics'] = {'measurement': '/plc/fv203'}
+    (folder / 'fleet.yaml').write_text(yaml.safe_dump(fleet))
+    command = [executable('damadics_bringup', 'policy'), str(folder / 'fleet.yaml'), '--simulate',
+               '--out', str(folder / 'policy.xml')]
+    subprocess.run(command, check=True, timeout=60)
+    return folder / 'policy.xml'
+
+
+def rights(policy: Path, verb: str) -> dict[str, set[str]]:
+    """Return what the nodes may publish, subscribe, reply or request: full names by node."""
+    found: dict[str, set[str]] = {}
+    for profile in ET.parse(policy).iter('profile'):
+        node = f'{profile.get("ns").rstrip("/")}/{profile.get("node")}'
+        found[node] = {e.text.replace('~', node, 1) for e in profile.findall(f'*[@{verb}]/*')}
+    return found
+
+
+def test_the_policy_lets_nobody_but_the_detector_raise_a_flag(secured):
+    for verb, name, owners in (
+        ('publish', '/lv101/fault_flag', {'/lv101/detector'}),
+        ('publish', '/lv101/estimate', {'/lv101/estimator'}),
+        ('publish', '/plc/fv203', {'/fv203/driver', '/fv203/plant'}),
+        ('request', '/lv101/reset', {'/dashboard'}),
+        ('subscribe', '/plc/fv203', {'/fv203/estimator', '/dashboard', '/recorder'}),
+    ):
+        assert {n for n, names in rights(secured, verb).items() if name in names} == owners
+
+
+def test_the_policy_has_what_ros2_security_reads(secured):
+    """Version, elements and attributes as in the schema of sros2, and that itself where it is."""
+    root = ET.parse(secured).getroot()
+    assert (root.tag, root.get('version')) == ('policy', '0.2.0')
+    paths = [e.get('path') for e in root.findall('enclaves/enclave')]
+    assert len(paths) == len(set(paths)) == 3 * 4 + 2
+    for profile in root.findall('enclaves/enclave/profiles/profile'):
+        assert set(profile.attrib) == {'ns', 'node'}
+        for group in profile:
+            assert group.tag in ('topics', 'services')
+            assert set(group.attrib.values()) == {'ALLOW'}
+            assert len(group), 'an empty list is refused'
+    sros2 = pytest.importorskip('sros2.policy', reason='sros2 comes with an installed ROS 2 only')
+    sros2.load_policy(secured)
 
 
 def test_without_keys_an_enforced_node_does_not_start(tmp_path):

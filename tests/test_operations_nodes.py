@@ -8,6 +8,9 @@ from types import SimpleNamespace
 
 import pytest
 from conftest import Peer, alone
+from damadics_bringup.fleet import Valve as FleetEntry
+from damadics_bringup.launcher import arguments_of
+from damadics_bringup.policy import policy
 from damadics_bringup.processes import Processes, executable, parameters, surroundings
 from damadics_fd.ros import qos
 from damadics_msgs.msg import FaultEvent, FaultFlag, Measurement
@@ -282,3 +285,49 @@ def test_a_pause_and_a_jump_back_of_simulated_time_raise_no_alarm(processes, pee
     assert values['Samples clock jumps'] == '1'
     stamp = valve.reports[-1].header.stamp
     assert stamp.sec < 60, 'diagnostics carry simulated time'
+
+
+def test_a_sample_a_second_is_no_silence_in_mode_scada(processes, peer):
+    second = 1_000_000_000
+    for name in ('estimator', 'detector'):
+        processes.start('damadics_fd', name, parameters(mode='scada'))
+    flags = peer.listen(FaultFlag, 'fault_flag', qos.FLAG)
+    assert peer.wait(lambda: flags and peer.node.count_subscribers('/measurement')
+                     and peer.node.count_publishers('/estimate'), 60.0)
+    peer.wait(lambda: False, 1.0)
+    for n in range(1, 6):
+        peer.send(n * second, 0.5, 0.5)
+        peer.wait(lambda: False, 1.0)
+        if n == 1:
+            before = len(flags)  # those from before the first sample
+    states = {flag.state for flag in flags[before:]}
+    assert states == {FaultFlag.STATE_LEARNING}, 'a sample a second was taken for silence'
+    assert peer.wait(lambda: flags[-1].state == FaultFlag.STATE_NOT_MONITORING, 3.0 + 1.0)
+
+
+def test_the_policy_of_a_fleet_allows_all_that_its_nodes_make(processes, peer):
+    """With SROS 2 enforced, a node that may not make one of its topics does not start."""
+    fleet = [FleetEntry('lv101')]
+    for node in ('estimator', 'detector'):
+        processes.start('damadics_fd', node, arguments_of({}, namespace='lv101'))
+    processes.start('damadics_plant', 'plant', arguments_of(
+        {'rate': 50.0, 'publish_clock': True}, namespace='lv101'))
+    graph = peer.node
+    services = ('/lv101/relearn', '/lv101/reset', '/lv101/inject_fault')
+    assert peer.wait(lambda: set(services) <= {
+        name for name, _ in graph.get_service_names_and_types()}, 60.0)
+    assert peer.wait(lambda: graph.count_publishers('/lv101/estimate')
+                     and graph.count_subscribers('/lv101/estimate'), 30.0)
+    asks = {'publish': graph.get_publisher_names_and_types_by_node,
+            'subscribe': graph.get_subscriber_names_and_types_by_node,
+            'reply': graph.get_service_names_and_types_by_node}
+    for profile in policy(fleet, simulate=True).getroot().iter('profile'):
+        name, namespace = profile.get('node'), profile.get('ns')
+        if namespace != '/lv101' or name == 'driver':
+            continue
+        for verb, ask in asks.items():
+            made = {topic for topic, _ in ask(name, namespace)}
+            allowed = {element.text.replace('~', f'/lv101/{name}', 1)
+                       for element in profile.findall(f'*[@{verb}]/*')}
+            assert made <= allowed, f'{name} may not {verb} {made - allowed}'
+            assert made or verb != 'reply'

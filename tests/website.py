@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the tests of the page share: its address, a browser, the state of a tile."""
 
+import os
 import re
 import socket
 import time
@@ -13,9 +14,11 @@ from html import unescape
 from pathlib import Path
 from typing import Any
 
+PICTURES = os.environ.get('DAMADICS_SCREENSHOTS')  # folder to write pictures of the page to
 CHROMIUM = Path('/usr/bin/chromium')
 FLAGS = ['--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run', '--disable-sync',
          '--disable-background-networking', '--disable-component-update']
+ALARM = ('M', 'S', 'F')  # classes of NE 107 that a tile with an alarm shows
 # learn in seconds what takes a minute in earnest
 LEARN_QUICKLY = {'t_on': 1.0, 't_w': 3.0, 't_learn': 8.0, 'travel_min': 0.1}
 PLANT = {'scenario': 'random_nominal', 'model': 'lugre', 'rate': 200.0, 'seed': 1}
@@ -38,6 +41,13 @@ def wait_until_served(address: str, patience: float = 60.0) -> None:
     raise AssertionError('the page is not served')
 
 
+def picture(page: Any, name: str) -> None:
+    """Keep a picture of a page where pictures are asked for."""
+    if PICTURES:
+        Path(PICTURES).mkdir(parents=True, exist_ok=True)
+        page.screenshot(path=Path(PICTURES, name))
+
+
 @contextmanager
 def browser() -> Iterator[Any]:
     """Start Chromium; None where there is none."""
@@ -58,15 +68,15 @@ class Tile:
 
     :param address: of the fleet page.
     :param valve: name of the valve.
-    :param chromium: the browser, if there is one.
+    :param page: of the browser, if there is one.
     """
 
-    def __init__(self, address: str, valve: str, chromium: Any = None) -> None:
+    def __init__(self, address: str, valve: str, page: Any = None) -> None:
         self._address = address
         self._valve = valve
-        self._page = chromium.new_page() if chromium else None
-        if self._page:
-            self._page.goto(address)
+        self._page = page
+        if page and page.url.rstrip('/') != address:
+            page.goto(address)
 
     def kind(self) -> str:
         """Return ok, learn, off, M, S, C or F; nothing while there is no tile."""

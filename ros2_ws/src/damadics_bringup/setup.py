@@ -26,6 +26,7 @@ setup(
     extras_require={'test': ['pytest']},
     entry_points={'console_scripts': [
         'demo = damadics_bringup.demo:main',
+        'policy = damadics_bringup.policy:main',
         'run = damadics_bringup.launcher:main',
     ]},
 )

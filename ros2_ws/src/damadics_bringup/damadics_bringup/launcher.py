@@ -21,7 +21,7 @@ EXAMPLES = """examples:
   ros2 run damadics_bringup run fleet.yaml --dashboard     your valves
   ros2 run damadics_bringup run fleet.yaml --record bags/today"""
 LOOK = 0.2  # s between two looks at the processes
-END = {'recorder': 60.0}  # s to write what it still has; 5 s for the others
+END = {'recorder': 60.0}  # s to write what it still has; 10 s for the others
 FIRST_PAUSE, LONGEST_PAUSE = 1.0, 30.0  # s before a node that has died is started again
 STABLE = 60.0  # s after which a node counts as running
 FOREVER = 1e8  # s of simulated time
@@ -37,7 +37,7 @@ class Task(NamedTuple):
 
 
 def arguments_of(parameters: dict[str, Any], *, namespace: str = '', file: Path | None = None,
-                 topics: dict[str, str] | None = None) -> list[str]:
+                 topics: dict[str, str] | None = None, enclave: str = '') -> list[str]:
     """
     Write a node's command line.
 
@@ -45,12 +45,15 @@ def arguments_of(parameters: dict[str, Any], *, namespace: str = '', file: Path 
     :param namespace: of the node, without leading slash.
     :param file: parameter file, read before the parameters.
     :param topics: new name by name.
+    :param enclave: of SROS 2; without security it does nothing.
     :return: arguments.
 
     >>> arguments_of({'noise': True}, namespace='lv101')
     ['--ros-args', '-r', '__ns:=/lv101', '-p', 'noise:=true']
     """
     words = ['--ros-args']
+    if enclave:
+        words += ['--enclave', enclave]
     if namespace:
         words += ['-r', f'__ns:=/{namespace}']
     for old, new in (topics or {}).items():
@@ -74,24 +77,27 @@ def tasks_of(valves: list[Valve], options: argparse.Namespace) -> list[Task]:
     tasks = []
     if options.record:
         tasks.append(Task('recorder', 'damadics_fd', 'recorder',
-                          ['--all', '--out', str(options.record)]))
+                          ['--all', '--out', str(options.record), *arguments_of(
+                              {}, enclave='/recorder')]))
     for valve in valves:
         tasks += [
             Task(f'{valve.name}/{node}', 'damadics_fd', node, arguments_of(
                 valve.settings_of(node), namespace=valve.name, file=valve.parameters,
-                topics=dict(valve.topics)))
+                topics=dict(valve.topics), enclave=f'/{valve.name}/{node}'))
             for node in ('estimator', 'detector')
         ]
     if options.dashboard:
         tasks.append(Task('dashboard', 'damadics_dashboard', 'dashboard',
                           ['--port', str(options.port), '--host', options.host]
-                          + (['--show'] if options.show else [])))
+                          + (['--show'] if options.show else [])
+                          + arguments_of({}, enclave='/dashboard')))
     if options.simulate:
         tasks += [
             Task(f'{valve.name}/plant', 'damadics_plant', 'plant', arguments_of(
                 {'duration': FOREVER, 'wait_for_subscribers': 1 + bool(options.record),
                  'actuator': valve.settings.get('actuator', valve.name), **valve.simulate},
-                namespace=valve.name, topics=dict(valve.topics)))
+                namespace=valve.name, topics=dict(valve.topics),
+                enclave=f'/{valve.name}/plant'))
             for valve in valves
         ]
     return tasks

@@ -112,7 +112,7 @@ class Processes:
         """End what still runs."""
         self.end_all()
 
-    def end_all(self, patience: float = 5.0, patient_with: Mapping[str, float] | None = None,
+    def end_all(self, patience: float = 10.0, patient_with: Mapping[str, float] | None = None,
                 hurry: Callable[[], bool] = lambda: False) -> list[str]:
         """
         End all processes at the same time: SIGINT, and SIGKILL for what then still runs.

@@ -24,11 +24,13 @@ def valves(context):
         actions += [
             Node(package='damadics_fd', executable=node, namespace=valve.name,
                  parameters=[*file, valve.settings_of(node)], remappings=topics,
+                 ros_arguments=['--enclave', f'/{valve.name}/{node}'],
                  respawn=True, respawn_delay=1.0, output='screen')
             for node in ('estimator', 'detector')
         ]
         actions.append(
             Node(package='damadics_plant', executable='plant', namespace=valve.name,
+                 ros_arguments=['--enclave', f'/{valve.name}/plant'],
                  parameters=[{'duration': 1e8, 'wait_for_subscribers': 1,
                               'actuator': valve.settings.get('actuator', valve.name),
                               **valve.simulate}],
@@ -51,7 +53,9 @@ def generate_launch_description():
         OpaqueFunction(function=valves),
         Node(package='damadics_fd', executable='recorder',
              arguments=['--all', '--out', LaunchConfiguration('bag')], output='screen',
+             ros_arguments=['--enclave', '/recorder'],
              condition=IfCondition(LaunchConfiguration('record'))),
         Node(package='damadics_dashboard', executable='dashboard', output='screen',
+             ros_arguments=['--enclave', '/dashboard'],
              condition=IfCondition(LaunchConfiguration('dashboard'))),
     ])

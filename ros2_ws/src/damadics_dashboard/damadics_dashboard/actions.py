@@ -74,13 +74,14 @@ def _ask(title: str, explanation: str, button: str,
     dialog.open()
 
 
-def alarm_buttons(watcher: Watcher, valve: Valve, occurrence: int) -> None:
+def alarm_buttons(watcher: Watcher, valve: Valve, occurrence: int) -> ui.button:
     """
     Draw the buttons of an alarm.
 
     :param watcher: the ROS side.
     :param valve: the valve.
     :param occurrence: number of the alarm.
+    :return: the button that acknowledges.
     """
     name = valve.name
 
@@ -97,13 +98,14 @@ def alarm_buttons(watcher: Watcher, valve: Valve, occurrence: int) -> None:
 
     title = valve.title
     with ui.element('div').classes('actions'):
-        ui.button('Acknowledge', on_click=acknowledge, color=None).props(
+        button = ui.button('Acknowledge', on_click=acknowledge, color=None).props(
             f'no-caps unelevated dense padding="4px 12px" '
             f'aria-label="Acknowledge alarm of {title}"').classes('main')
         for words, act in (('Reset', reset), ('Shelve', shelve)):
             ui.button(words, on_click=act, color=None).props(
                 f'no-caps flat dense padding="4px 12px" aria-label="{words} alarm of {title}"'
             ).classes('plain')
+    return button
 
 
 def valve_buttons(watcher: Watcher, valve: Valve) -> None:

@@ -27,7 +27,7 @@ class AlarmList:
         self._watcher = watcher
         self._valves = valves
         self._name = name
-        self._rows: dict[tuple[str, int], tuple[ui.element, ui.html]] = {}
+        self._rows: dict[tuple[str, int], tuple[ui.element, ui.html, ui.button]] = {}
         self._order: list[tuple[str, int]] = []
         self._empty = ui.html('<p class="empty">No alarms.</p>', sanitize=False)
         self._box = ui.element('div').classes('stack').props(
@@ -51,7 +51,8 @@ class AlarmList:
                 self._rows[key] = self._row(valve, alarm)
                 if time.monotonic() - valve.flag_at < 2.0:
                     ui.run_javascript(f'damadics.say({_announcement(valve, alarm)!r})')
-            row, body = self._rows[key]
+            row, body, acknowledge = self._rows[key]
+            acknowledge.set_visibility(not alarm.acknowledged)
             kind = markup.alarm_kind(alarm)
             fresh = 'fresh' if not alarm.acknowledged and alarm.state == 'active' else ''
             row.classes(replace=f'alarm {kind} {fresh}')
@@ -68,12 +69,12 @@ class AlarmList:
         self._empty.set_visibility(not present)
         return len(present)
 
-    def _row(self, valve: Valve, alarm: Alarm) -> tuple[ui.element, ui.html]:
+    def _row(self, valve: Valve, alarm: Alarm) -> tuple[ui.element, ui.html, ui.button]:
         with self._box, ui.element('div').props('role="listitem"') as row:
             row.props(f'data-occurrence={alarm.occurrence}')
             body = ui.html('', sanitize=False).classes('body')
-            alarm_buttons(self._watcher, valve, alarm.occurrence)
-        return row, body
+            acknowledge = alarm_buttons(self._watcher, valve, alarm.occurrence)
+        return row, body, acknowledge
 
 
 def _announcement(valve: Valve, alarm: Alarm) -> str:

@@ -64,18 +64,17 @@ def main(args: list[str] | None = None) -> int:
     """
     Serve the page until a signal comes.
 
-    :param args: command line, `sys.argv` by default; what follows `--ros-args` is left out.
+    :param args: command line, `sys.argv` by default; what follows `--ros-args` is for ROS 2.
     :return: exit code.
     """
     words = sys.argv[1:] if args is None else args
-    if '--ros-args' in words:
-        words = words[:words.index('--ros-args')]
-    options = parser().parse_args(words)
+    own = words.index('--ros-args') if '--ros-args' in words else len(words)
+    options = parser().parse_args(words[:own])
     try:
         token = read_token(options.token_file)
         check_binding(options.host, token)
         signal.signal(signal.SIGTERM, signal.default_int_handler)
-        serve(options, token)
+        serve(options, token, words[own:])
     except KeyboardInterrupt:
         return 0  # the server repeats the signal after its clean end
     except AccessError as problem:
@@ -87,12 +86,13 @@ def main(args: list[str] | None = None) -> int:
     return 0
 
 
-def serve(options: argparse.Namespace, token: str) -> None:
+def serve(options: argparse.Namespace, token: str, ros_args: list[str]) -> None:
     """
     Serve the page.
 
     :param options: the command line.
     :param token: the token, '' for none.
+    :param ros_args: arguments of ROS 2, such as its enclave.
     """
     _check_port(options.host, options.port)
     # after the check of the arguments, for they take a second
@@ -106,7 +106,7 @@ def serve(options: argparse.Namespace, token: str) -> None:
     from damadics_dashboard.watcher import Watcher
 
     history = History(options.state / 'history.sqlite')
-    watcher = Watcher(history, options.follow)
+    watcher = Watcher(history, options.follow, ros_args)
     app.add_static_files('/assets', str(HERE / 'static'))
     app.add_middleware(Guard, token=token)
     ui.page('/')(lambda: fleet_page(watcher))

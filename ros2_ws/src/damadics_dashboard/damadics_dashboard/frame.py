@@ -5,6 +5,7 @@
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
+from html import escape
 
 from nicegui import ui
 
@@ -18,7 +19,7 @@ VALVE = (
 )
 FAVICON = VALVE.replace('<svg ', '<svg xmlns="http://www.w3.org/2000/svg" ', 1).replace(
     'currentColor', '#0a64bd')
-VERSION = 1  # of the static files, for the caches of browsers
+VERSION = 2  # of the static files, for the caches of browsers
 PAGES = (('/', 'Fleet'), ('/history', 'History'), ('/replay', 'Replay'))
 NEXT_THEME = {None: True, True: False, False: None}
 THEME = {None: ('brightness_auto', 'follow the system'), True: ('dark_mode', 'dark'),
@@ -75,6 +76,22 @@ def frame(title: str, here: str, watcher: Watcher) -> Iterator[None]:
             f'flat round dense aria-label="colours: {words}"').style('color: var(--muted)')
     with ui.element('main').classes('page').props('id=content'):
         yield
+
+
+@contextmanager
+def card(title: str, remark: str = '') -> Iterator[ui.element]:
+    """
+    Draw a card with a head; the content goes inside.
+
+    :param title: of the card.
+    :param remark: at the right of the head; left out on a phone.
+    :yield: the head, to put more into it.
+    """
+    with ui.element('section').classes('card'):
+        with ui.element('div').classes('head') as head:
+            ui.html(f'<h2>{escape(title)}</h2>', sanitize=False)
+            ui.html(escape(remark), sanitize=False).classes('sub')
+        yield head
 
 
 def _stored_theme() -> bool | None:

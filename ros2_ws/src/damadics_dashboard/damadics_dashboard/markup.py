@@ -66,17 +66,17 @@ def number(value: float | None, unit: str = '', digits: int = 3) -> str:
 
 def spark(ratios: Iterable[float]) -> str:
     """
-    Draw the course of residual / threshold, the largest of every second; log 0.01 .. 10.
+    Draw the course of residual / threshold, the largest of every second; log 0.01 .. 100.
 
     :param ratios: oldest first.
     :return: an SVG.
     """
-    heights = [38.0 - 38.0 * min(max((math.log10(max(r, 1e-9)) + 2.0) / 3.0, 0.0), 1.0)
+    heights = [38.0 - 38.0 * min(max((math.log10(max(r, 1e-9)) + 2.0) / 4.0, 0.0), 1.0)
                for r in ratios]
     points = ' '.join(
         f'{200.0 * n / max(len(heights) - 1, 1):.1f},{y:.1f}' for n, y in enumerate(heights)
     )
-    limit = 38.0 - 38.0 * 2.0 / 3.0
+    limit = 38.0 - 38.0 * 2.0 / 4.0
     return (f'<svg class="spark" viewBox="0 0 200 38" preserveAspectRatio="none" '
             f'aria-hidden="true"><line class="limit" x1="0" x2="200" y1="{limit:.1f}" '
             f'y2="{limit:.1f}"/><polyline class="curve" points="{points}"/></svg>')
@@ -95,7 +95,7 @@ def tile(valve: Valve, now: float) -> str:
     alarm = valve.alarm()
     why = condition.detail
     if alarm is not None and alarm.evidence:
-        why = alarm.evidence['text']
+        why = alarm.evidence['text'].removeprefix(f'{valve.tag}: ')
     ratio = 0.0
     if valve.flag is not None and valve.flag.threshold > 0.0:
         ratio = valve.flag.residual / valve.flag.threshold
@@ -177,7 +177,7 @@ def alarm_body(valve: Valve, alarm: Alarm, *, name: bool) -> str:
     """
     e = alarm.evidence
     who = f'{escape(valve.title)} · ' if name else ''
-    cause = e.get('cause') or 'cause unknown'
+    cause = (e.get('cause') or 'cause unknown').replace('_', ' ')
     seen = ('<span class="tag done">acknowledged</span>' if alarm.acknowledged
             else '<span class="tag hot">unacknowledged</span>')
     words = NE107.get(alarm.level, ('', 'shelved'))[1]
@@ -187,12 +187,12 @@ def alarm_body(valve: Valve, alarm: Alarm, *, name: bool) -> str:
         ('threshold', number(e.get('threshold'), '1/s')),
         ('peak ratio', number(e.get('ratio'), '×')),
         ('duration', age(e.get('duration'))),
-        ('confidence', number(_percent(e.get('confidence')), '%', 2)),
+        ('confidence', _percent(e.get('confidence'))),
         ('strength', number(e.get('strength'))),
     ]
     grid = ''.join(f'<div>{label}<b>{value}</b></div>' for label, value in cells if value != '–')
     return (
-        f'<div><b class="t">{who}Alarm {alarm.occurrence}: {escape(str(cause))}</b> '
+        f'<div><b class="t">{who}Alarm {alarm.occurrence}: {escape(cause)}</b> '
         f'<span class="tag">{escape(words)}</span> <span class="tag">{alarm.state}</span> {seen}'
         f'</div><div>{escape(e.get("text", "evidence not received"))}</div>'
         f'<div class="sub">{escape(e.get("advice", ""))}</div>'
@@ -243,5 +243,5 @@ def history_table(rows: list[dict[str, Any]], *, name: bool) -> str:
     )
 
 
-def _percent(share: float | None) -> float | None:
-    return None if share is None else 100.0 * share
+def _percent(share: float | None) -> str:
+    return '–' if share is None else f'{100.0 * share:.0f} %'

@@ -37,7 +37,7 @@ class Playback:
     events: list[Event] = field(default_factory=list)
     problems: list[str] = field(default_factory=list)
     curves: dict[str, Points] = field(default_factory=dict)
-    signature: Points = field(default_factory=list)
+    signature: list[Points] = field(default_factory=list)  # before and since the first alarm
     range: tuple[float, float] = (0.0, 1.0)  # s
     truth: str = ''
 
@@ -121,7 +121,11 @@ def _draw(done: Playback, columns: dict[str, NDArray[Any]], result: Any, width: 
     cloud = np.zeros(len(stamp), [('stamp', 'i8'), ('x', 'f8'), ('u', 'f8')])
     cloud['stamp'] = stamp
     cloud['x'], cloud['u'] = result.estimates['x1'][order], result.estimates['u'][order]
-    done.signature = block_means(cloud, 'x', 'u', max(BLOCK, width))[:MOST_POINTS]
+    parts = [cloud]
+    if done.alarms:
+        parts = np.split(cloud, [int(np.searchsorted(stamp, done.alarms[0].stamp))])
+    done.signature = [block_means(part, 'x', 'u', max(BLOCK, width))[:MOST_POINTS]
+                      for part in parts]
 
 
 def _truth(recording: Recording, done: Playback) -> str:

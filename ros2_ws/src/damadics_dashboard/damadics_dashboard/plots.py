@@ -40,6 +40,8 @@ def time_plot(names: list[str], unit: str, *, log: bool = False, low: float | No
         axis['min'] = low
     if high is not None:
         axis['max'] = high
+        if low is not None:
+            axis['interval'] = (high - low) / 4.0
     option: dict[str, Any] = {
         'animation': False,
         'grid': {'left': 52, 'right': 14, 'top': 34, 'bottom': 52 if zoom else 24},

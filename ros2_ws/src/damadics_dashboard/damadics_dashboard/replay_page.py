@@ -12,15 +12,14 @@ from damadics_fd.bag.errors import BagError
 from nicegui import run, ui
 
 from damadics_dashboard import markup
-from damadics_dashboard.frame import frame
+from damadics_dashboard.frame import card, frame
 from damadics_dashboard.playback import MODES, Playback, play
 from damadics_dashboard.plots import Plot, signature_plot, time_plot
 from damadics_dashboard.valve import age, moment
 from damadics_dashboard.watcher import Watcher
 
 LARGEST = 2 << 30  # B
-HINT = ('Drop an MCAP bag here, or choose one. It runs through the same estimator and detector '
-        'as the live nodes, with the same flags.')
+HINT = 'Drop an MCAP bag here, or choose one: the same estimator and detector, the same flags.'
 
 
 def replay_page(watcher: Watcher) -> None:
@@ -97,10 +96,9 @@ def _show(done: Playback, mode: str) -> None:
                       dashed=('threshold',)),
                 _plot('Stem velocity', ['X2'], ['x2'], ['--velocity'], done, '[1/s]'),
             ]
-        with ui.element('div').classes('stack'), ui.element('section').classes('card'):
-            ui.html('<div class="head"><h2>Valve signature</h2><span class="sub">input over '
-                    'position</span></div>', sanitize=False)
-            cloud = Plot(signature_plot(('whole recording',)), ['--now'],
+        with ui.element('div').classes('stack'), card('Valve signature', 'input over position'):
+            names = ('before the alarm', 'since the alarm') if alarms else ('whole recording',)
+            cloud = Plot(signature_plot(names), ['--before', '--now'][-len(names):],
                          'valve signature: force over position', 'plot tall')
     with ui.element('section').classes('card w-full'):
         ui.html('<div class="head"><h2>Transitions</h2></div>', sanitize=False)
@@ -110,14 +108,13 @@ def _show(done: Playback, mode: str) -> None:
     for plot, series in plots:
         message[plot.id] = {'all': True, 'series': series, 'from': [], 'range': done.range}
     message[plots[1][0].id]['areas'] = done.areas()
-    message[cloud.id] = {'all': True, 'series': [done.signature], 'from': []}
+    message[cloud.id] = {'all': True, 'series': done.signature, 'from': []}
     ui.run_javascript(f'damadics.push({json.dumps(message, separators=(",", ":"))})')
 
 
 def _plot(title: str, names: list[str], curves: list[str], colors: list[str], done: Playback,
           unit: str, **options: Any) -> tuple[Plot, list[Any]]:
-    with ui.element('section').classes('card'):
-        ui.html(f'<div class="head"><h2>{title}</h2></div>', sanitize=False)
+    with card(title):
         plot = Plot(time_plot(names, unit, zoom=True, **options), colors, f'{title} over time',
                     'plot zoom')
     return plot, [done.curves[name] for name in curves]

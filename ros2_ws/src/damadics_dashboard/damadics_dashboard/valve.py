@@ -224,10 +224,17 @@ class Valve:
             flag.state, 'returned' if cleared else 'active')
         known = self.diagnostics.get('detector', {}).get('Acknowledged') == 'True'
         onset = flag.onset.sec * NANO + flag.onset.nanosec
+        evidence = dict(told[-1]) if told else {}
+        if evidence and state == 'active':  # the event tells how it was then
+            stamp = flag.header.stamp.sec * NANO + flag.header.stamp.nanosec
+            evidence |= {'residual': flag.residual, 'threshold': flag.threshold,
+                         'duration': max(stamp - onset, 0) / NANO}
+            if flag.threshold > 0.0:
+                now = flag.residual / flag.threshold
+                evidence['ratio'] = max(evidence.get('ratio') or 0.0, now)
         return Alarm(flag.occurrence, flag.level,
                      'shelved' if flag.state == FaultFlag.STATE_SHELVED else state,
-                     known or flag.occurrence in self.acknowledged, onset,
-                     told[-1] if told else {})
+                     known or flag.occurrence in self.acknowledged, onset, evidence)
 
 
 def age(seconds: float | None) -> str:

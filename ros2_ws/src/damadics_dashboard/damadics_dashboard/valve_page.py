@@ -13,7 +13,7 @@ from nicegui import ui
 from damadics_dashboard import markup
 from damadics_dashboard.actions import simulator_panel, valve_buttons
 from damadics_dashboard.alarms import AlarmList
-from damadics_dashboard.frame import frame
+from damadics_dashboard.frame import card, frame
 from damadics_dashboard.plots import (
     Curve,
     Feed,
@@ -92,37 +92,30 @@ class _Page:
         """Draw the plots over time and say what is in them."""
         traces = self._valve.traces
         curves: dict[int, list[Curve]] = {}
-        with self._card('Control value and position', 'fractions of the stroke, 1 = closed'):
+        with card('Control value and position', 'fractions of the stroke, 1 = closed'):
             plot = Plot(time_plot(['CV', 'X1'], '[1]', low=0.0, high=1.0, dashed=('CV',)),
                         ['--cv', '--x1'], 'control value and position over time')
             curves[plot.id] = [Curve(traces['measurement'], 'cv'),
                                Curve(traces['measurement'], 'x1')]
-        with self._card('Residual against threshold', 'the largest of each interval'):
-            self._scale = ui.switch('logarithmic', value=True, on_change=self._rescale).props(
-                'dense').classes('sub').classes('scale')
+        with card('Residual against threshold', 'the largest of each interval') as head:
+            with head:
+                self._scale = ui.switch('logarithmic', value=True, on_change=self._rescale).props(
+                    'dense').classes('scale')
             self._residual = Plot(
                 time_plot(['residual', 'threshold'], '[1/s]', log=True, dashed=('threshold',)),
                 ['--residual', '--rho'], 'velocity residual and threshold over time')
             curves[self._residual.id] = [Curve(traces['estimate'], 'residual', largest=True),
                                          Curve(traces['threshold'], 'rho', largest=True)]
-        with self._card('Stem velocity', 'strokes per second'):
+        with card('Stem velocity', 'strokes per second'):
             plot = Plot(time_plot(['X2'], '[1/s]'), ['--velocity'], 'stem velocity over time')
             curves[plot.id] = [Curve(traces['estimate'], 'x2')]
         return curves
 
     def _signature_plot(self) -> Plot:
-        with self._card('Valve signature', 'input over position, means of 0.1 s'):
+        with card('Valve signature', 'input over position, means of 0.1 s'):
             return Plot(signature_plot(('fault-free', f'last {SIGNATURE_NOW:.0f} s')),
                         ['--before', '--now'], 'valve signature: force over position',
                         'plot tall')
-
-    @staticmethod
-    def _card(title: str, unit: str) -> ui.element:
-        card = ui.element('section').classes('card').style('position:relative')
-        with card:
-            ui.html(f'<div class="head"><h2>{title}</h2><span class="sub">{unit}</span></div>',
-                    sanitize=False)
-        return card
 
     def _show(self, window: float) -> None:
         self._feed.window = float(window)

@@ -7,7 +7,7 @@ import math
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import rclpy
@@ -43,14 +43,16 @@ class Watcher:
     :param history: takes the transitions.
     :param follow: valves up to this number have all their samples taken all the time; in a larger
         fleet only those that somebody looks at.
+    :param ros_args: arguments of ROS 2, from `--ros-args` on.
     """
 
-    def __init__(self, history: History, follow: int) -> None:
+    def __init__(self, history: History, follow: int, ros_args: Sequence[str] = ()) -> None:
         self.history = history
         self.valves: dict[str, Valve] = {name: Valve(name) for name in history.valves()}
         for event in reversed(history.latest(count=1000)):
             self.valves[event['valve']].take_event(event)
         self._follow = follow
+        self._ros_args = list(ros_args)
         self._wanted: dict[str, float] = {}
         self._subscriptions: dict[tuple[str, str], Any] = {}
         self._clients: dict[str, Any] = {}
@@ -144,7 +146,7 @@ class Watcher:
 
     def _run(self) -> None:
         try:
-            rclpy.init(args=[], signal_handler_options=rclpy.SignalHandlerOptions.NO)
+            rclpy.init(args=self._ros_args, signal_handler_options=rclpy.SignalHandlerOptions.NO)
             self._node = Node('dashboard')
             executor = EventsExecutor()
             executor.add_node(self._node)
@@ -183,9 +185,9 @@ class Watcher:
         self.services = {name for name, _ in self._node.get_service_names_and_types()}
         for topic, kinds in self._node.get_topic_names_and_types():
             parent, _, name = topic.rpartition('/')
-            if (name == 'fault_flag' and FLAG_TYPE in kinds) or (
+            if ((name == 'fault_flag' and FLAG_TYPE in kinds) or (
                 name == 'measurement' and MEASUREMENT_TYPE in kinds
-            ):
+            )) and self._node.count_publishers(topic):
                 self._meet(parent.lstrip('/'))
         now = time.monotonic()
         alive = [v for v in self.valves if (v, 'fault_flag') in self._subscriptions]

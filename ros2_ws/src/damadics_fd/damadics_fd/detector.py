@@ -40,7 +40,7 @@ class DetectorNode(MonitoringNode):
         self._core = Detector(self.settings)
         self._decision: Decision | None = None
         self._loaded: int | None = None  # stamp of the alarm state that was loaded
-        self._twice = 0
+        self._judged = self._twice = 0
         self._phase = PHASE_INIT
         self._number = Float64Stamped()
         self._flag = FaultFlag()
@@ -114,6 +114,7 @@ class DetectorNode(MonitoringNode):
             self._core.signature.relearn()  # somebody had the valve learned afresh
         self._phase = estimate.phase
         decision = self._decision = self._core.update(estimate)
+        self._judged += 1
         header = message.header
         self._number.header = self._flag.header = header
         self._number.data = decision.residual
@@ -176,6 +177,7 @@ class DetectorNode(MonitoringNode):
             'Acknowledged': decision.acknowledged,
             'Near misses': statistics['near_misses'],
             'Chatter': bool(statistics['chatter']),
+            'Estimates judged': self._judged,
             'Estimates received twice': self._twice,
             'NE 107': NE107[decision.level],
         }

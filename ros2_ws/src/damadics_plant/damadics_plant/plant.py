@@ -141,8 +141,8 @@ class Plant(Node):
         self._sent += len(signals[0])
 
     def destroy_node(self) -> None:
-        """Let subscribers take what was sent, then go."""
-        if rclpy.ok():
+        """Let subscribers take the end of a scenario, then go."""
+        if self.finished:
             self._measurement.wait_for_all_acked(rclpy.duration.Duration(seconds=2.0))
         super().destroy_node()
 

@@ -1,0 +1,148 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Command `policy`: the SROS 2 policy of a fleet, in which each node may do what it needs."""
+
+import argparse
+import sys
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from damadics_fd.ros.commands import command_parser
+
+from damadics_bringup.fleet import FleetError, Valve, read_fleet
+
+EXAMPLES = """example:
+  ros2 run damadics_bringup policy fleet.yaml --out policy.xml
+  ros2 security create_keystore keystore
+  ros2 security generate_artifacts -k keystore -p policy.xml"""
+# what rclpy makes for every node: without the right to it, a node does not start
+EVERY_NODE = ('describe_parameters', 'get_parameter_types', 'get_parameters', 'list_parameters',
+              'set_parameters', 'set_parameters_atomically', 'get_type_description')
+LIFECYCLE = ('change_state', 'get_available_states', 'get_available_transitions', 'get_state',
+             'get_transition_graph')
+SAMPLES = ('measurement', 'estimate', 'threshold', 'fault_flag', 'fault_event')
+ALL = (*SAMPLES, 'residual', 'signature', 'fault_state')
+OPERATE = ('acknowledge', 'reset', 'shelve', 'relearn', 'save_reference', 'load_reference')
+
+
+@dataclass
+class Rights:
+    """What one node may do; a name without a leading slash is of its valve."""
+
+    publish: Sequence[str] = ()
+    subscribe: Sequence[str] = ()
+    reply: Sequence[str] = ()
+    request: Sequence[str] = field(default=())
+
+
+NODES = {  # of every valve
+    'estimator': Rights(
+        ('estimate', '/diagnostics', '~/transition_event'), ('measurement',),
+        ('relearn', 'save_reference', 'load_reference', *(f'~/{name}' for name in LIFECYCLE))),
+    'detector': Rights(
+        ('residual', 'threshold', 'fault_flag', 'fault_event', 'signature', '/diagnostics',
+         '~/transition_event'), ('estimate', 'fault_flag'),
+        ('acknowledge', 'reset', 'shelve', *(f'~/{name}' for name in LIFECYCLE))),
+    'driver': Rights(('measurement',)),  # of the plant: its name is for you to choose
+}
+PLANT = Rights(('measurement', 'fault_state', '/clock'), (), ('inject_fault',))
+
+
+def policy(valves: Sequence[Valve], simulate: bool = False) -> ET.ElementTree:
+    """
+    Write down what each node of a fleet may do.
+
+    :param valves: the fleet.
+    :param simulate: also for the simulated plants.
+    :return: a document of the form that `ros2 security` takes (version 0.2.0).
+    """
+    root = ET.Element('policy', version='0.2.0')
+    enclaves = ET.SubElement(root, 'enclaves')
+    for valve in valves:
+        for node, rights in {**NODES, **({'plant': PLANT} if simulate else {})}.items():
+            _enclave(enclaves, f'/{valve.name}', node, _of_valve(rights, valve))
+    operate = (*OPERATE, 'inject_fault') if simulate else OPERATE
+    page = _all(valves, Rights((), SAMPLES, (), operate))
+    _enclave(enclaves, '/', 'dashboard', Rights(
+        (), (*page.subscribe, '/diagnostics'), (), page.request))
+    events = [f'/{v.name}/{node}/transition_event' for v in valves
+              for node in ('estimator', 'detector')]
+    _enclave(enclaves, '/', 'recorder', Rights(
+        ('/diagnostics',), (*_all(valves, Rights((), ALL)).subscribe, *(f'/{n}' for n in ALL),
+                            '/diagnostics', '/rosout', '/parameter_events', *events)))
+    ET.indent(root)
+    return ET.ElementTree(root)
+
+
+def _of_valve(rights: Rights, valve: Valve) -> Rights:
+    """Give names their full form, with the topics where they are on the plant."""
+    def full(names: Iterable[str]) -> list[str]:
+        named = (valve.topics.get(name, name) for name in names)
+        return [name if name[0] in '/~' else f'/{valve.name}/{name}' for name in named]
+
+    return Rights(full(rights.publish), full(rights.subscribe), full(rights.reply),
+                  full(rights.request))
+
+
+def _all(valves: Iterable[Valve], rights: Rights) -> Rights:
+    """Collect the rights in all valves."""
+    each = [_of_valve(rights, valve) for valve in valves]
+    return Rights(subscribe=[name for one in each for name in one.subscribe],
+                  request=[name for one in each for name in one.request])
+
+
+def _enclave(enclaves: ET.Element, namespace: str, node: str, rights: Rights) -> None:
+    path = f'{namespace.rstrip("/")}/{node}'
+    profiles = ET.SubElement(ET.SubElement(enclaves, 'enclave', path=path), 'profiles')
+    profile = ET.SubElement(profiles, 'profile', ns=namespace, node=node)
+    for kind, verb, names in (
+        ('topic', 'subscribe', (*rights.subscribe, '/clock')),
+        ('topic', 'publish', (*rights.publish, '/rosout', '/parameter_events')),
+        ('service', 'reply', (*rights.reply, *(f'~/{name}' for name in EVERY_NODE))),
+        ('service', 'request', rights.request),
+    ):
+        if names:
+            group = ET.SubElement(profile, f'{kind}s', {verb: 'ALLOW'})
+            for name in dict.fromkeys(names):
+                ET.SubElement(group, kind).text = name
+
+
+def parser() -> argparse.ArgumentParser:
+    """
+    Describe the command line.
+
+    :return: its parser.
+    """
+    p = command_parser('policy', 'Write the SROS 2 policy of a fleet: one enclave per node.',
+                       EXAMPLES)
+    p.add_argument('fleet', type=Path, help='list of the valves (YAML)')
+    p.add_argument('--simulate', action='store_true', help='also for the simulated plants')
+    p.add_argument('--out', type=Path, metavar='FILE', help='write it here (standard output)')
+    return p
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """
+    Run the command.
+
+    :param args: command line, `sys.argv` by default.
+    :return: exit code.
+    """
+    options = parser().parse_args(args)
+    try:
+        tree = policy(read_fleet(options.fleet), options.simulate)
+        text = ET.tostring(tree.getroot(), encoding='unicode', xml_declaration=True) + '\n'
+        if options.out:
+            options.out.write_text(text)
+        else:
+            print(text, end='')
+    except (FleetError, OSError) as problem:
+        print(f'policy: {problem}', file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
