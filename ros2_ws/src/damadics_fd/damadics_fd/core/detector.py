@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from damadics_fd.core import alarm, decision, signature
 from damadics_fd.core.estimation import ESTIMATE, Estimate
 from damadics_fd.core.events import Event, events_of
-from damadics_fd.core.jit import jit
+from damadics_fd.core.jit import jit, layer
 from damadics_fd.core.modes import PHASE_HOLD, PHASE_PAPER
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.signature import Signature
@@ -30,7 +30,7 @@ STATE = np.dtype((np.record, np.dtype([
     *decision.STATE, *alarm.STATE, ('place', 'f8'), ('moved', 'i8'),
 ], align=True)))
 STIR = 0.01  # of the stroke: less is no motion of the stem
-
+ACCEPTED = np.zeros(1, np.uint8)
 
 
 class Decision(NamedTuple):
@@ -66,7 +66,7 @@ class Outcome(NamedTuple):
     events: tuple[Event, ...]
 
 
-@jit
+@layer
 def step(s: Any, c: Any, g: Any, gc: Any, e: Any, d: Any) -> None:
     """
     Judge one estimate.
@@ -138,18 +138,34 @@ def report(s: Any, g: Any, gc: Any, e: Any, d: Any) -> None:
 
 
 @jit
-def update(s: NDArray, c: NDArray, g: NDArray, gc: NDArray, e: NDArray, d: NDArray) -> None:
+def judge(s: NDArray, c: NDArray, g: NDArray, gc: NDArray, reason: NDArray, e: NDArray,
+          d: NDArray, keep: bool, first: int) -> tuple[int, int]:
     """
-    Judge one estimate; `step` for arrays of length 1, to be called from Python.
+    Judge estimates one after the other: live one of them, in a recording all.
 
     :param s: detector state.
     :param c: settings.
     :param g: state of the signature.
     :param gc: settings of the signature.
-    :param e: estimate.
-    :param d: decision, written.
+    :param reason: 0 where there is an estimate.
+    :param e: estimates.
+    :param d: decisions, written where there is an estimate.
+    :param keep: keep a row for each; otherwise only decisions with a transition, as many as
+        there is room for.
+    :param first: row to begin with.
+    :return: the row after the last one, and the number of decisions with a transition.
     """
-    step(s[0], c[0], g[0], gc[0], e[0], d[0])
+    kept = 0
+    for i in range(first, len(e)):
+        if reason[i] != 0:
+            continue
+        row = i if keep else kept
+        step(s[0], c[0], g[0], gc[0], e[i], d[row])
+        if d[row].transitions != 0:
+            kept += 1
+            if not keep and kept == len(d):
+                return i + 1, kept
+    return len(e), kept
 
 
 @jit
@@ -198,9 +214,26 @@ class Detector:
         :return: the decision; `events` holds the transitions of the alarm at this sample.
         """
         self._estimate[0] = estimate
-        update(self.state, self._settings, self.signature.state, self.signature.record,
-               self._estimate, self._decision)
+        self.judge(ACCEPTED, self._estimate, self._decision)
         return self.decision
+
+    def judge(self, reason: NDArray[np.uint8], estimates: NDArray[Any], decisions: NDArray[Any],
+              keep: bool = True, first: int = 0) -> tuple[int, int]:
+        """
+        Judge a column of estimates.
+
+        :param reason: 0 where there is an estimate.
+        :param estimates: structured, fields of Estimate.
+        :param decisions: structured, fields of Decision; written where there is an estimate.
+        :param keep: keep a row for each; otherwise only decisions with a transition, as many as
+            there is room for.
+        :param first: row to begin with.
+        :return: the row after the last one, and the number of decisions with a transition.
+        """
+        done: tuple[int, int] = judge(
+            self.state, self._settings, self.signature.state, self.signature.record, reason,
+            estimates, decisions, keep, first)
+        return done
 
     @property
     def decision(self) -> Decision:

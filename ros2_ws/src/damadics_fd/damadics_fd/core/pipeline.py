@@ -1,6 +1,6 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""A recording through estimator and detector in one compiled loop."""
+"""A recording through the compiled loops of estimator and detector."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from damadics_fd.core import detector as detecting
 from damadics_fd.core import estimation
 from damadics_fd.core.alarm import RAISED
 from damadics_fd.core.detector import DECISION, Detector
@@ -22,7 +21,8 @@ from damadics_fd.core.quality import REASONS, SIGNALS
 from damadics_fd.core.scada.estimator import ScadaEstimator, estimator_for
 from damadics_fd.core.settings import Settings
 
-ROOM = 64  # decisions with a transition that `watch` takes from the loop at once
+PIECE = 4096  # samples that `watch` holds at once
+ROOM = 64  # decisions with a transition that it takes from the loop at once
 
 
 @dataclass(frozen=True)
@@ -79,20 +79,17 @@ class Result:
 
 
 @jit
-def loop(q: NDArray, s: NDArray, ds: NDArray, c: NDArray, g: NDArray, gc: NDArray,
-         first: int, stamp: NDArray, cv: NDArray, x1: NDArray, p1: NDArray, p2: NDArray,
-         t1: NDArray, flow: NDArray, ps: NDArray, keep: bool, reason: NDArray,
-         estimates: NDArray, decisions: NDArray) -> tuple[int, int]:
+def estimate(q: NDArray, s: NDArray, c: NDArray, reason: NDArray, estimates: NDArray,
+             stamp: NDArray, cv: NDArray, x1: NDArray, p1: NDArray, p2: NDArray, t1: NDArray,
+             flow: NDArray, ps: NDArray) -> None:
     """
-    Run `estimator.step` and `detector.step` over columns.
+    Run `estimation.step` over columns.
 
     :param q: quality state.
     :param s: estimator state.
-    :param ds: detector state.
     :param c: settings.
-    :param g: state of the signature.
-    :param gc: settings of the signature.
-    :param first: sample to begin with.
+    :param reason: written: 0 or the reason of refusal.
+    :param estimates: written; rows of refused samples stay as they are.
     :param stamp: stamps [ns].
     :param cv: control values.
     :param x1: positions.
@@ -101,26 +98,10 @@ def loop(q: NDArray, s: NDArray, ds: NDArray, c: NDArray, g: NDArray, gc: NDArra
     :param t1: temperatures.
     :param flow: flows.
     :param ps: chamber pressures.
-    :param keep: keep a row for each sample; otherwise only decisions with a transition, as many
-        as there is room for, and no more than one row of the others is used.
-    :param reason: written: 0 or the reason of refusal.
-    :param estimates: written; rows of refused samples stay as they are.
-    :param decisions: written; rows of refused samples stay as they are.
-    :return: the sample after the last one, and the number of decisions with a transition.
     """
-    kept = 0
-    for i in range(first, len(stamp)):
-        row = i if keep else 0
-        reason[row] = estimation.step(q[0], s[0], c[0], estimates[row], stamp[i], cv[i], x1[i],
-                                      p1[i], p2[i], t1[i], flow[i], ps[i])
-        if reason[row] == 0:
-            d = decisions[i if keep else kept]
-            detecting.step(ds[0], c[0], g[0], gc[0], estimates[row], d)
-            if d.transitions != 0:
-                kept += 1
-                if not keep and kept == len(decisions):
-                    return i + 1, kept
-    return len(stamp), kept
+    for i in range(len(stamp)):
+        reason[i] = estimation.step(q[0], s[0], c[0], estimates[i], stamp[i], cv[i], x1[i], p1[i],
+                                    p2[i], t1[i], flow[i], ps[i])
 
 
 def run(columns: Mapping[str, NDArray[Any]], settings: Settings,
@@ -146,10 +127,9 @@ def run(columns: Mapping[str, NDArray[Any]], settings: Settings,
     if isinstance(estimator, ScadaEstimator):
         _run_scada(estimator, detector, stamp, signals, reason, estimates, decisions)
     else:
-        cv, x1, p1, p2, t1, flow, ps = signals
-        loop(estimator.quality, estimator.state, detector.state, _record(settings),
-             detector.signature.state, detector.signature.record, 0, stamp, cv, x1, p1, p2, t1,
-             flow, ps, True, reason, estimates, decisions)
+        estimate(estimator.quality, estimator.state, _record(settings), reason, estimates, stamp,
+                 *signals)
+        detector.judge(reason, estimates, decisions)
     _blank(reason, stamp, estimates, decisions)
     return Result(reason, estimates, decisions, estimator, detector)
 
@@ -169,17 +149,19 @@ def watch(columns: Mapping[str, NDArray[Any]], settings: Settings, estimator: Es
     """
     if isinstance(estimator, ScadaEstimator):
         return run(columns, settings, estimator, detector).events
-    stamp, (cv, x1, p1, p2, t1, flow, ps) = _contiguous(columns)
-    reason, estimate = np.empty(1, np.uint8), np.empty(1, ESTIMATE)
+    stamp, signals = _contiguous(columns)
+    reason, estimates = np.empty(PIECE, np.uint8), np.empty(PIECE, ESTIMATE)
     decisions = np.empty(ROOM, DECISION)
     events: list[Event] = []
-    first = 0
-    while first < len(stamp):
-        first, kept = loop(
-            estimator.quality, estimator.state, detector.state, _record(settings),
-            detector.signature.state, detector.signature.record, first, stamp, cv, x1, p1, p2, t1,
-            flow, ps, False, reason, estimate, decisions)
-        events += [event for decision in decisions[:kept] for event in events_of(decision)]
+    for first in range(0, len(stamp), PIECE):
+        piece = slice(first, first + PIECE)
+        n = len(stamp[piece])
+        estimate(estimator.quality, estimator.state, _record(settings), reason, estimates,
+                 stamp[piece], *(signal[piece] for signal in signals))
+        done = 0
+        while done < n:
+            done, kept = detector.judge(reason[:n], estimates[:n], decisions, False, done)
+            events += [event for decision in decisions[:kept] for event in events_of(decision)]
     return events
 
 

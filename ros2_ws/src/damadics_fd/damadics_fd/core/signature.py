@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from damadics_fd.core.jit import jit
+from damadics_fd.core.jit import jit, layer
 from damadics_fd.core.signature_air import supply_lost, track_air
 from damadics_fd.core.signature_blocks import add_sample, close_block, judge_block, open_block
 from damadics_fd.core.signature_cues import check_passivity, stick_evidence, track_stick
@@ -204,7 +204,7 @@ def material(s: Any, c: Any) -> bool:
     return True
 
 
-@jit
+@layer
 def judge(s: Any, c: Any) -> int:
     """
     Use the middle one of three whole blocks.
@@ -231,9 +231,10 @@ def judge(s: Any, c: Any) -> int:
     else:
         if s.state == STATE_ALARM:
             check_passivity(s, c)
+        news = s.state == STATE_ALARM and s.standing != 0 and stick_evidence(s) > 0.0
         if s.moving != 0 and fresh:
-            monitor_block(s, c)
-        elif s.state == STATE_ALARM and s.standing != 0 and stick_evidence(s) > 0.0:
+            news = monitor_block(s, c)
+        if news:
             decide(s, c)
         if s.state == STATE_VERIFY:
             finish_verification(s, c)
@@ -255,13 +256,14 @@ def since_alarm(s: Any, c: Any) -> bool:
     return began
 
 
-@jit
-def monitor_block(s: Any, c: Any) -> None:
+@layer
+def monitor_block(s: Any, c: Any) -> bool:
     """
-    Add a moving block to the sums and weigh them.
+    Add a moving block to the sums and, where there is no alarm, look for one.
 
     :param s: state record.
     :param c: settings record.
+    :return: True if there is news on an alarm.
     """
     r = residual(s)
     for m in range(SET_SLOW + 1):
@@ -273,11 +275,11 @@ def monitor_block(s: Any, c: Any) -> None:
         s.ph[X1_T] = s.ph[X1] * tau
         accumulate(s, SET_ALARM, 1.0 - 1.0 / c.memory[SET_ALARM], r)
         s.n_alarm += s.w
-        decide(s, c)
-        return
+        return True
     watch(s, c)
     if s.own != 0:
         start_alarm(s)
+    return False
 
 
 @jit

@@ -5,7 +5,7 @@
 import math
 from typing import Any
 
-from damadics_fd.core.jit import jit
+from damadics_fd.core.jit import jit, layer
 from damadics_fd.core.signature_air import restart_air, supply_change
 from damadics_fd.core.signature_cues import stick_evidence
 from damadics_fd.core.signature_evidence import clear_set, evaluate, joint_change, physical_value
@@ -284,12 +284,25 @@ def name_elastic(s: Any, c: Any, m: int, p: float) -> None:
         return  # named by stage 2
     s.cause = CAUSE_ELASTIC
     s.confidence = p
-    best = SPRING
-    for h in range(SPRING, N_HYP):
-        if s.logp[m][h] > s.logp[m][best]:
-            best = h
+    best = likeliest(s, m)
     s.cause_value, s.cause_std = physical_value(s, c, m, best)
     s.second = cause_of(best, s.cause_value)
+
+
+@jit
+def likeliest(s: Any, m: int) -> int:
+    """
+    Return the likeliest hypothesis of the elastic family.
+
+    :param s: state record.
+    :param m: set with the evidence.
+    :return: SPRING to POSITION_OFFSET.
+    """
+    best = SPRING
+    for h in range(PRELOAD, N_HYP):
+        if s.logp[m][h] > s.logp[m][best]:
+            best = h
+    return best
 
 
 @jit
@@ -306,7 +319,7 @@ def cause_of(h: int, value: float) -> int:
     return CAUSE_PRELOAD + h - PRELOAD
 
 
-@jit
+@layer
 def second_stage(s: Any, c: Any) -> None:
     """
     Name the member of the elastic family from a longer record after the alarm.
@@ -339,12 +352,10 @@ def second_stage(s: Any, c: Any) -> None:
             s.family = FAMILY_ELASTIC
     if s.family != FAMILY_ELASTIC:
         return
-    best = SPRING
+    best = likeliest(s, m)
     total = 0.0
     for h in range(SPRING, N_HYP):
         total += math.exp(s.logp[m][h])
-        if s.logp[m][h] > s.logp[m][best]:
-            best = h
     p = math.exp(s.logp[m][best]) / max(total, 1e-300)
     s.cause_value, s.cause_std = physical_value(s, c, m, best)
     s.second = cause_of(best, s.cause_value)

@@ -12,6 +12,7 @@ import math
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from damadics_fd.core.jit import jit
 from damadics_fd.core.signature_linalg import cholesky, forward, inverse
@@ -37,6 +38,10 @@ from damadics_fd.core.signature_types import (
 
 # column of hypotheses 3 to 7: 1, position gain, chamber pressure, P1 - P2, position offset
 COLUMN = np.array([-1, -1, -1, ONE, N_REF + 3, N_REF, N_REF + 1, N_REF + 2])
+# columns of the hypotheses with several
+FRICTION_COLUMNS = np.array([SIGN, V, SIGN_T])
+SPRING_COLUMNS = np.array([X1, X1_T])
+JOINT_COLUMNS = np.array([X1, ONE, SIGN, V])
 MIN_EVIDENCE = 4.0  # blocks
 CONFLICT = 3.0  # log odds of the moving stem against friction that outweigh the stick range
 SMALL = 2e-3  # [1] tolerance of the exclusions
@@ -111,17 +116,18 @@ def eliminate_reference(s: Any, m: int, iv: float) -> float:
     """
     S = s.S[m]
     q = s.q[m]
-    L, Y, y0 = s.L, s.Y, s.y0
-    for i in range(N_REF):
+    L, Y, y0 = s.L[0], s.Y[0], s.y0
+    n = len(y0)
+    for i in range(n):
         for j in range(i + 1):
             L[i, j] = iv * S[i, j] + s.J0[i, j]
         for j in range(N_COL):
             Y[i, j] = iv * S[i, j]
         y0[i] = iv * q[i]
-    if not cholesky(L, L):
+    if not cholesky(L, L, n):
         return -1.0
-    forward(L, Y)
-    for i in range(N_REF):
+    forward(L, Y, n, len(q))
+    for i in range(n):
         a = y0[i]
         for k in range(i):
             a -= L[i, k] * y0[k]
@@ -139,7 +145,7 @@ def eliminate_reference(s: Any, m: int, iv: float) -> float:
         a = iv * S[i, i]
         for k in range(N_REF):
             a -= Y[k, i] * Y[k, i]
-        s.Gm[i, i] = max(a, 0.0)
+        s.Gm[0, i, i] = max(a, 0.0)
     return max(J_0, 0.0)
 
 
@@ -157,7 +163,7 @@ def cross_information(s: Any, m: int, iv: float, i: int, j: int) -> float:
     """
     a: float = iv * s.S[m][i, j]
     for k in range(N_REF):
-        a -= s.Y[k, i] * s.Y[k, j]
+        a -= s.Y[0, k, i] * s.Y[0, k, j]
     return a
 
 
@@ -175,34 +181,34 @@ def growth_time(s: Any) -> float:
 
 @jit
 def solve_group(
-    s: Any, c: Any, m: int, iv: float, columns: tuple[int, int, int], count: int,
-    prior: tuple[float, float, float],
+    s: Any, m: int, iv: float, columns: NDArray[np.int64], count: int,
+    prior: tuple[float, float, float, float],
 ) -> float:
     """
     Fit the columns of one hypothesis.
 
     :param s: state record; the changes d and their covariance H are written.
-    :param c: settings record.
     :param m: index of the set.
     :param iv: 1 / variance of a block.
     :param columns: of the regressor; the first `count` of them are used.
     :param count: number of columns.
     :param prior: standard deviation of each change.
-    :return: misfit that the hypothesis explains.
+    :return: misfit that the hypothesis explains; negative if the sums are not usable.
     """
+    H, d = s.H[0], s.d
     for i in range(count):
-        s.H[i, i] = s.Gm[columns[i], columns[i]] + 1.0 / (prior[i] * prior[i])
+        H[i, i] = s.Gm[0, columns[i], columns[i]] + 1.0 / (prior[i] * prior[i])
         for j in range(i):
-            s.H[i, j] = cross_information(s, m, iv, columns[i], columns[j])
-    s.d[:] = 0.0
-    if not inverse(s.H[:count, :count], s.W[:count, :count]):
-        return 0.0
+            H[i, j] = cross_information(s, m, iv, columns[i], columns[j])
+        d[i] = 0.0
+    if not inverse(H, s.W[0], count):
+        return -1.0
     explained = 0.0
     for i in range(count):
         for j in range(count):
-            s.d[i] += s.H[i, j] * s.gv[columns[j]]
-        explained += s.d[i] * s.gv[columns[i]]
-    return explained
+            d[i] += H[i, j] * s.gv[columns[j]]
+        explained += d[i] * s.gv[columns[i]]
+    return max(explained, 0.0)
 
 
 @jit
@@ -222,7 +228,7 @@ def combine(s: Any, count: int, a: float, b: float, scale: float) -> tuple[float
     for i in range(count):
         value += weight[i] * s.d[i]
         for j in range(count):
-            variance += weight[i] * weight[j] * s.H[i, j]
+            variance += weight[i] * weight[j] * s.H[0, i, j]
     return value / scale, math.sqrt(max(variance, 0.0)) / scale
 
 
@@ -253,8 +259,8 @@ def evaluate(s: Any, c: Any, m: int, eps: float, b_r: float, b_p: float) -> floa
     now = growth_time(s)
     # friction: dry and viscous part together
     count = 3 if m == SET_ALARM else 2
-    explained = solve_group(s, c, m, iv, (SIGN, V, SIGN_T), count,
-                            (c.change_std[1], c.change_std[0], c.growth_std[0]))
+    explained = solve_group(s, m, iv, FRICTION_COLUMNS, count,
+                            (c.change_std[1], c.change_std[0], c.growth_std[0], 1.0))
     v_mean = s.vb[m] / ne
     scale = max(s.theta[SIGN] + s.theta[V] * v_mean, 1e-3)
     logp[FRICTION] = J_0 - explained
@@ -262,15 +268,15 @@ def evaluate(s: Any, c: Any, m: int, eps: float, b_r: float, b_p: float) -> floa
     if value[FRICTION] < -1.3 - SMALL / scale:
         logp[FRICTION] = J_0  # friction cannot become negative
     # spring
-    explained = solve_group(s, c, m, iv, (X1, X1_T, V), count - 1,
-                            (c.change_std[2], c.growth_std[1], 1.0))
+    explained = solve_group(s, m, iv, SPRING_COLUMNS, count - 1,
+                            (c.change_std[2], c.growth_std[1], 1.0, 1.0))
     logp[SPRING] = J_0 - explained
     value[SPRING], std[SPRING] = combine(s, count - 1, now, 0.0, s.theta[X1])
     if value[SPRING] < -1.05:
         logp[SPRING] = J_0
     for h in range(PRELOAD, N_HYP):
         k = COLUMN[h]
-        info = s.Gm[k, k] + 1.0 / (c.change_std[h] * c.change_std[h])
+        info = s.Gm[0, k, k] + 1.0 / (c.change_std[h] * c.change_std[h])
         value[h] = s.gv[k] / info
         std[h] = 1.0 / math.sqrt(info)
         logp[h] = J_0 - s.gv[k] * value[h]
@@ -282,13 +288,17 @@ def evaluate(s: Any, c: Any, m: int, eps: float, b_r: float, b_p: float) -> floa
     for h in range(1, N_HYP):
         logp[h] = math.log(c.prior[h]) - logp[h] / (2.0 * sc)
     logp[FRICTION] -= 0.5 * math.log(ne)
-    if logp[SPRING:].max() - logp[FRICTION] > CONFLICT:
+    elastic = logp[SPRING]
+    for h in range(PRELOAD, N_HYP):
+        elastic = max(elastic, logp[h])
+    if elastic - logp[FRICTION] > CONFLICT:
         b_r = 0.0  # a growing spring change widens the stick range too
     D: float = (J_0 - J_min) / sc + 2.0 * b_r
     s.D[m] = D
     logp[FRICTION] += b_r
-    logp[SPRING:] += b_p
-    top = logp[1:].max()
+    for h in range(SPRING, N_HYP):
+        logp[h] += b_p
+    top = max(logp[FRICTION], elastic + b_p)
     total = 0.0
     for h in range(1, N_HYP):
         total += math.exp(logp[h] - top)
@@ -336,20 +346,10 @@ def joint_change(s: Any, c: Any, m: int) -> bool:
     iv = 1.0 / (s.sigma * s.sigma)
     if eliminate_reference(s, m, iv) < 0.0:
         return False
-    columns = (X1, ONE, SIGN, V)
     prior = (c.change_std[2], c.change_std[3], c.change_std[1], c.change_std[0])
-    H = np.empty((4, 4))
-    work = np.empty((4, 4))
-    for i in range(4):
-        H[i, i] = s.Gm[columns[i], columns[i]] + 1.0 / (prior[i] * prior[i])
-        for j in range(i):
-            H[i, j] = cross_information(s, m, iv, columns[i], columns[j])
-    if not inverse(H, work):
+    if solve_group(s, m, iv, JOINT_COLUMNS, len(s.d), prior) < 0.0:
         return False
-    d = np.zeros(4)
-    for i in range(4):
-        for j in range(4):
-            d[i] += H[i, j] * s.gv[columns[j]]
+    H, d = s.H[0], s.d
     v = s.vb[m] / ne
     scale = max(s.theta[SIGN] + s.theta[V] * v, 1e-3)
     s.now[0] = d[0] / s.theta[X1]

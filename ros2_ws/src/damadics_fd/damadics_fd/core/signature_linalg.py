@@ -11,15 +11,15 @@ Matrix = NDArray[np.float64]
 
 
 @jit
-def cholesky(A: Matrix, L: Matrix) -> bool:
+def cholesky(A: Matrix, L: Matrix, n: int) -> bool:
     """
-    Factorise A = L L'.
+    Factorise A = L L', n x n.
 
-    :param A: symmetric positive definite, n x n; only the lower triangle is read.
-    :param L: n x n, receives the lower triangle; may be A itself.
+    :param A: symmetric positive definite; only the lower triangle is read.
+    :param L: receives the lower triangle; may be A itself.
+    :param n: leading rows and columns to use.
     :return: False where A is not positive definite; L is then unusable.
     """
-    n = A.shape[0]
     for j in range(n):
         d = A[j, j]
         for k in range(j):
@@ -37,14 +37,15 @@ def cholesky(A: Matrix, L: Matrix) -> bool:
 
 
 @jit
-def forward(L: Matrix, B: Matrix) -> None:
+def forward(L: Matrix, B: Matrix, n: int, m: int) -> None:
     """
     Solve L Y = B in place.
 
     :param L: lower triangle, n x n.
-    :param B: n x m right-hand sides, receives Y.
+    :param B: m right-hand sides, receives Y.
+    :param n: leading rows and columns of L to use.
+    :param m: leading columns of B to use.
     """
-    n, m = B.shape
     for i in range(n):
         for k in range(i):
             a = L[i, k]
@@ -55,21 +56,21 @@ def forward(L: Matrix, B: Matrix) -> None:
 
 
 @jit
-def inverse(A: Matrix, work: Matrix) -> bool:
+def inverse(A: Matrix, work: Matrix, n: int) -> bool:
     """
     Invert a symmetric positive definite matrix in place.
 
-    :param A: n x n, receives its inverse.
-    :param work: n x n scratch.
+    :param A: receives its inverse.
+    :param work: scratch of at least n x n.
+    :param n: leading rows and columns to use.
     :return: False where A is not positive definite.
     """
-    n = A.shape[0]
-    if not cholesky(A, work):
+    if not cholesky(A, work, n):
         return False
-    A[:, :] = 0.0
     for i in range(n):
-        A[i, i] = 1.0
-    forward(work, A)  # A = L^-1
+        for j in range(n):
+            A[i, j] = 1.0 if i == j else 0.0
+    forward(work, A, n, n)  # A = L^-1
     for i in range(n):  # L^-T L^-1: rows k < i of L^-1 have no column i
         for j in range(i + 1):
             a = 0.0

@@ -102,58 +102,65 @@ def finish_learning(s: Any, c: Any) -> bool:
             s.state = STATE_INSUFFICIENT
         return False
     S, q, wn = s.S[SET_ALARM], s.q[SET_ALARM], s.ne[SET_ALARM]
-    H, work, J0 = s.Gm[:N_REF, :N_REF], s.L, s.J0
-    prior_precision(J0, c, work)
-    for i in range(N_REF):
-        for j in range(N_REF):
-            H[i, j] = S[i, j] + J0[i, j]
-    if not inverse(H, work):
+    H, work, prior = s.Gm[0], s.L[0], s.Y[0]
+    n = len(s.theta)
+    prior_precision(prior, c, work, n)
+    for i in range(n):
+        for j in range(n):
+            H[i, j] = S[i, j] + prior[i, j]
+    if not inverse(H, work, n):
         return False
-    for i in range(N_REF):  # theta0 = H^-1 (q0 + Pi theta_nominal)
+    for i in range(n):  # theta0 = H^-1 (q0 + Pi theta_nominal)
         s.theta[i] = 0.0
-        for j in range(N_REF):
+        for j in range(n):
             a = q[j]
             for k in range(TABLE):
-                a += J0[j, k] * c.theta_nominal[k]
+                a += prior[j, k] * c.theta_nominal[k]
             s.theta[i] += H[i, j] * a
     misfit, freedom = s.rr[SET_ALARM], wn
-    for i in range(N_REF):
+    for i in range(n):
         misfit -= 2.0 * s.theta[i] * q[i]
-        for j in range(N_REF):
+        for j in range(n):
             misfit += s.theta[i] * S[i, j] * s.theta[j]
             freedom -= H[i, j] * S[j, i]  # parameters that the data, not the prior, decide
     s.sigma = max(c.sigma_min, math.sqrt(max(misfit, 0.0) / max(freedom, 1.0)))
-    for i in range(N_REF):
-        for j in range(N_REF):
-            J0[i, j] = INFLATION * s.sigma * s.sigma * H[i, j]
+    for i in range(n):
+        for j in range(n):
+            H[i, j] *= INFLATION * s.sigma * s.sigma
         floor = c.floor[min(i, TABLE - 1)] if i < TABLE else c.plug_floor
-        J0[i, i] += floor * floor
-    if not inverse(J0, work):
+        H[i, i] += floor * floor
+    if not inverse(H, work, n):
         return False
+    for i in range(n):
+        for j in range(n):
+            s.J0[i, j] = H[i, j]
     s.r_ref = max(s.r_max, max(2.4 * s.theta[SIGN], STICK_FLOOR))
     clear_set(s, SET_ALARM)
     return True
 
 
 @jit
-def prior_precision(Pi: Any, c: Any, work: Any) -> None:
+def prior_precision(Pi: Any, c: Any, work: Any, n: int) -> None:
     """
     Fill the prior information on the reference, scaled to the smallest block noise.
 
-    :param Pi: N_REF x N_REF, written.
+    :param Pi: n x n or larger, written.
     :param c: settings record.
-    :param work: scratch of the same shape.
+    :param work: scratch of at least n x n.
+    :param n: N_REF.
     """
-    Pi[:, :] = 0.0
+    for i in range(n):
+        for j in range(n):
+            Pi[i, j] = 0.0
     for i in range(TABLE):
         Pi[i, i] = c.theta_std[i] * c.theta_std[i]
     for i in range(N_TABLE):
         for j in range(N_TABLE):
             Pi[TABLE + i, TABLE + j] = c.plug_gain_std * c.plug_gain_std
         Pi[TABLE + i, TABLE + i] += c.plug_shape_std * c.plug_shape_std
-    inverse(Pi, work)
-    for i in range(N_REF):
-        for j in range(N_REF):
+    inverse(Pi, work, n)
+    for i in range(n):
+        for j in range(n):
             Pi[i, j] *= c.sigma_min * c.sigma_min
 
 

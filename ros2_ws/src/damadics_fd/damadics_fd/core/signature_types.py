@@ -24,10 +24,13 @@ N_REF = TABLE + N_TABLE  # columns of the reference model
 PB, G, POS, POSX = N_REF, N_REF + 1, N_REF + 2, N_REF + 3
 SIGN_T, X1_T = N_REF + 4, N_REF + 5  # the same as SIGN and X1, growing with time
 N_COL = N_REF + 6
+N_FIT = 4  # columns that one hypothesis fits at most
 
 # -- accumulators ---------------------------------------------------------------------------
-SET_FAST, SET_MID, SET_SLOW, SET_ALARM = 0, 1, 2, 3
 N_SETS = 4
+# of numpy: numba would compile a function anew for each literal int that it is given
+_SETS: Any = np.arange(N_SETS)
+SET_FAST, SET_MID, SET_SLOW, SET_ALARM = _SETS
 
 # -- hypotheses -----------------------------------------------------------------------------
 N_HYP = 8
@@ -259,9 +262,10 @@ STATE_DTYPE = _record(
         ('air_ring', 'f8', (2, STROKES)), ('air_ring_ps', 'f8', (2, STROKES)),
         ('air_rate', 'f8', (2,)), ('air_rate_ps', 'f8', (2,)),
         # work space of the compiled functions
-        ('L', 'f8', (N_REF, N_REF)), ('Y', 'f8', (N_REF, N_COL)), ('y0', 'f8', (N_REF,)),
-        ('Gm', 'f8', (N_COL, N_COL)), ('gv', 'f8', (N_COL,)), ('H', 'f8', (3, 3)),
-        ('W', 'f8', (3, 3)), ('d', 'f8', (3,)),
+        # a stack of one matrix: numba types its members alike, whatever their size
+        ('L', 'f8', (1, N_REF, N_REF)), ('Y', 'f8', (1, N_REF, N_COL)), ('y0', 'f8', (N_REF,)),
+        ('Gm', 'f8', (1, N_COL, N_COL)), ('gv', 'f8', (N_COL,)), ('H', 'f8', (1, N_FIT, N_FIT)),
+        ('W', 'f8', (1, N_FIT, N_FIT)), ('d', 'f8', (N_FIT,)),
     ]
 )
 
