@@ -124,6 +124,16 @@ def result(scenario, detector, seed, t_dt):
     }  # fmt: skip
 
 
+def test_results_of_other_settings_give_way_to_newer_ones(tmp_path):
+    old, new = result('f1_S', 'scada', 0, 9.0), result('f1_S', 'scada', 0, 3.0)
+    other = result('f1_S', 'ewma', 0, 5.0)
+    lines = [json.dumps(r) for r in (old, other, {**new, 'settings_hash': 'new'})]
+    (tmp_path / 'results.jsonl').write_text('\n'.join([*lines, '{"torn']))
+    times = {r['detector']: r['indices']['t_dt'] for r in read_results(tmp_path)}
+    assert times == {'scada': 3.0, 'ewma': 5.0}
+    assert len(read_results(tmp_path)) == 2
+
+
 def test_summary_and_comparison():
     a = [result('f1_S', 'scada', s, t) for s, t in enumerate((10, 20, math.inf))]
     b = [result('f1_S', 'scada', s, t) for s, t in enumerate((5, 20, 30))]

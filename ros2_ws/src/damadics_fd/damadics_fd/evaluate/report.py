@@ -110,7 +110,12 @@ def cards(rows: Sequence[dict[str, Any]], false_alarms: Sequence[dict[str, Any]]
         found.append((f'{alarms["days_with_alarm"]} in {alarms["days"]}',
                       'fault-free days with an alarm'))  # fmt: skip
     first, of = versus_baselines(rows, without=MODEL_BASED)
-    found.append((f'{first} of {of}', 'found no later than by the best baseline'))
+    against_all, _ = versus_baselines(rows, without=('scada',))
+    found.append((
+        f'{first} of {of}',
+        'found no later than by the best baseline '
+        f"({against_all} with thresholds on the monitor's own residuals counted as baselines)",
+    ))
     abrupt = [
         r for r in ours.values()
         if r['detected'] and case(r['scenario']).abrupt and not math.isnan(r['first_right'])

@@ -34,6 +34,8 @@ def read_results(directory: Path) -> list[Result]:
     """
     Return the results of a campaign directory; a torn last line of a killed run is dropped.
 
+    Where a detector was run again with other settings, its newest results count.
+
     :param directory: as given to `run_campaign`.
     :raises FileNotFoundError: where it holds no results.
     """
@@ -46,7 +48,8 @@ def read_results(directory: Path) -> list[Result]:
             results.append(json.loads(line))
         except json.JSONDecodeError:
             continue
-    return results
+    newest = {r['detector']: r['settings_hash'] for r in results}
+    return [r for r in results if r['settings_hash'] == newest[r['detector']]]
 
 
 def run_campaign(
