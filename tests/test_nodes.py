@@ -9,6 +9,7 @@ import time
 
 import numpy as np
 import pytest
+import website
 from damadics_bringup.processes import (
     executable,
     parameters,
@@ -21,6 +22,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 
 pytestmark = pytest.mark.ros
 PERIOD = 2_500_000  # ns
+PYTEST = 'PYTEST_CURRENT_TEST'  # the page takes it for a test of its own
 SPEAK_AT_ONCE = {'PYTHONUNBUFFERED': '1', 'RCUTILS_LOGGING_BUFFERED_STREAM': '0'}
 
 
@@ -124,16 +126,21 @@ def test_a_node_alone_says_what_it_waits_for(processes, name):
     processes.end(name)
 
 
-@pytest.mark.parametrize('name', ['estimator', 'detector', 'recorder', 'plant'])
+@pytest.mark.parametrize('name', ['estimator', 'detector', 'recorder', 'plant', 'dashboard'])
 @pytest.mark.parametrize('numbers', [
     (signal.SIGINT,), (signal.SIGTERM,), (signal.SIGINT, signal.SIGINT),
 ], ids=['Ctrl-C', 'kill', 'launch'])  # launch passes a Ctrl-C on that has reached the node before
 def test_signals_end_a_node_with_exit_code_0(domain, tmp_path, name, numbers):
-    arguments = ['--all', '--out', str(tmp_path / 'bag')] if name == 'recorder' else []
-    package = 'damadics_plant' if name == 'plant' else 'damadics_fd'
+    arguments = {
+        'recorder': ['--all', '--out', str(tmp_path / 'bag')],
+        'dashboard': ['--port', str(website.free_port()), '--state', str(tmp_path)],
+    }.get(name, [])
+    package = {'plant': 'damadics_plant', 'dashboard': 'damadics_dashboard'}.get(
+        name, 'damadics_fd')
     process = subprocess.Popen(
         [executable(package, name), *arguments],
-        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, env={**os.environ, **SPEAK_AT_ONCE},
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+        env={k: v for k, v in {**os.environ, **SPEAK_AT_ONCE}.items() if k != PYTEST},
     )
     try:
         assert process.stdout.readline(), 'the node did not start'

@@ -105,6 +105,14 @@ def test_the_parameter_file_is_taken_by_the_node(name, tmp_path):
     assert complaints == ['  no_such: there is no such parameter']
 
 
+def test_replay_takes_the_arguments_that_launch_adds(tmp_path):
+    command = [executable('damadics_fd', 'replay'), str(tmp_path / 'none.mcap'), '--live',
+               '--inputs-only', '--ros-args', '--enclave', '/replay']
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert 'unrecognized arguments' not in done.stderr
+    assert 'none.mcap' in done.stderr
+
+
 def test_all_mistakes_in_a_fleet_are_listed(tmp_path):
     path = tmp_path / 'fleet.yaml'
     path.write_text(yaml.safe_dump({'valves': {

@@ -7,8 +7,9 @@ import os
 import signal
 import sys
 from pathlib import Path
+from typing import Any
 
-from damadics_fd.ros.commands import command_parser, state_folder
+from damadics_fd.ros.commands import command_parser, split_ros_args, state_folder
 
 from damadics_dashboard.access import AccessError, Guard, check_binding
 
@@ -67,15 +68,15 @@ def main(args: list[str] | None = None) -> int:
     :param args: command line, `sys.argv` by default; what follows `--ros-args` is for ROS 2.
     :return: exit code.
     """
-    words = sys.argv[1:] if args is None else args
-    own = words.index('--ros-args') if '--ros-args' in words else len(words)
-    options = parser().parse_args(words[:own])
+    words, ros_args = split_ros_args(args)
+    options = parser().parse_args(words)
     try:
         token = read_token(options.token_file)
         check_binding(options.host, token)
         signal.signal(signal.SIGTERM, signal.default_int_handler)
-        serve(options, token, words[own:])
+        serve(options, token, ros_args)
     except KeyboardInterrupt:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
         return 0  # the server repeats the signal after its clean end
     except AccessError as problem:
         print(f'dashboard: {problem}', file=sys.stderr)
@@ -118,6 +119,7 @@ def serve(options: argparse.Namespace, token: str, ros_args: list[str]) -> None:
     def valve(name: str) -> None:
         valve_page(watcher, name)
 
+    app.on_startup(_take_one_signal)
     app.on_startup(watcher.start)
     app.on_shutdown(watcher.stop)
     app.on_shutdown(history.close)
@@ -129,6 +131,19 @@ def serve(options: argparse.Namespace, token: str, ros_args: list[str]) -> None:
            show=options.show, reload=False, show_welcome_message=False, language='en-US',
            tailwind=False, unocss=None, uvicorn_logging_level='warning', reconnect_timeout=10.0)
 
+
+def _take_one_signal() -> None:
+    """Ignore a second signal, which launch sends: the server would not leave the graph then."""
+    both = (signal.SIGINT, signal.SIGTERM)
+    of_server = {number: signal.getsignal(number) for number in both}
+
+    def end(number: int, frame: Any) -> None:
+        for other in both:
+            signal.signal(other, signal.SIG_IGN)
+        of_server[number](number, frame)
+
+    for number in both:
+        signal.signal(number, end)
 
 
 def _check_port(host: str, port: int) -> None:

@@ -151,7 +151,8 @@ class Player(Node):
 
 
 def publish(
-    recordings: Sequence[Recording], plan: Plan, rate: float, inputs_only: bool = False
+    recordings: Sequence[Recording], plan: Plan, rate: float, inputs_only: bool = False,
+    ros_args: Sequence[str] = (),
 ) -> int:
     """
     Publish recordings one after the other.
@@ -160,10 +161,11 @@ def publish(
     :param plan: mode and settings of estimator and detector.
     :param rate: speed in multiples of real time.
     :param inputs_only: publish the samples alone, for estimator and detector nodes that run.
+    :param ros_args: arguments of ROS 2, from `--ros-args` on.
     :return: exit code, 0 also after SIGINT and SIGTERM.
     :raises BagError: where a recording cannot be read.
     """
-    rclpy.init(args=[])
+    rclpy.init(args=list(ros_args))
     try:
         for recording in recordings:
             settings = Settings.for_mode(plan.mode, **plan.settings)

@@ -20,6 +20,7 @@ from damadics_fd.core.modes import MODES
 from damadics_fd.core.settings import Settings, SettingsError
 from damadics_fd.offline import Outcome, Plan, replay, warm_up
 from damadics_fd.replay_output import check_format, print_table, write_outcomes
+from damadics_fd.ros.commands import split_ros_args
 
 EXAMPLES = """examples:
   ros2 run damadics_fd replay bags/friction --mode paper --figures figures --out result.json
@@ -106,7 +107,8 @@ def _parameters(path: Path) -> dict[str, Any]:
 
 def main(args: list[str] | None = None) -> int:
     """Run the command."""
-    options = arguments(args)
+    words, ros_args = split_ros_args(args)
+    options = arguments(words)
     try:
         if options.out:
             check_format(options.out)
@@ -118,7 +120,7 @@ def main(args: list[str] | None = None) -> int:
         if options.live:
             from damadics_fd.live import publish
 
-            return publish(recordings, plan, options.rate, options.inputs_only)
+            return publish(recordings, plan, options.rate, options.inputs_only, ros_args)
         outcomes = replay_all(recordings, plan, options.jobs)
         if options.out:
             write_outcomes(outcomes, options.out)

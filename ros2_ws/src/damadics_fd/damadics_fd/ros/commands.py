@@ -4,6 +4,8 @@
 
 import argparse
 import os
+import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 
@@ -30,3 +32,18 @@ def command_parser(name: str, description: str, examples: str) -> argparse.Argum
         prog=name, description=description, epilog=examples,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+
+
+def split_ros_args(args: Sequence[str] | None) -> tuple[list[str], list[str]]:
+    """
+    Part a command line into the command's own arguments and those of ROS 2.
+
+    :param args: command line, `sys.argv` by default.
+    :return: what comes before `--ros-args`, which launch adds to every node, and the rest.
+
+    >>> split_ros_args(['my_bag', '--ros-args', '--enclave', '/replay'])
+    (['my_bag'], ['--ros-args', '--enclave', '/replay'])
+    """
+    words = list(sys.argv[1:] if args is None else args)
+    own = words.index('--ros-args') if '--ros-args' in words else len(words)
+    return words[:own], words[own:]
