@@ -88,7 +88,7 @@ def browser_processes() -> list[int]:
             words = (folder / 'cmdline').read_bytes().split(b'\0')
         except OSError:
             continue
-        if words[0] and Path(os.fsdecode(words[0])).name.startswith('chrom'):
+        if Path(os.fsdecode(words[0].partition(b' ')[0])).name.startswith('chrom'):
             found.append(int(folder.name))
     return found
 

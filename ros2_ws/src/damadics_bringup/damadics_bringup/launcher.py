@@ -14,7 +14,7 @@ from ament_index_python.packages import get_package_share_directory
 from damadics_fd.ros.commands import command_parser, state_folder
 
 from damadics_bringup.fleet import FleetError, Valve, read_fleet
-from damadics_bringup.processes import ProcessError, Processes
+from damadics_bringup.processes import ProcessError, Processes, assignments
 
 EXAMPLES = """examples:
   ros2 run damadics_bringup run --simulate --dashboard     one simulated valve and the web page
@@ -60,10 +60,7 @@ def arguments_of(parameters: dict[str, Any], *, namespace: str = '', file: Path 
         words += ['-r', f'{old}:={new}']
     if file:
         words += ['--params-file', str(file)]
-    for name, value in parameters.items():
-        text = str(value).lower() if isinstance(value, bool) else str(value)
-        words += ['-p', f'{name}:={text}']
-    return words
+    return words + assignments(parameters)
 
 
 def tasks_of(valves: list[Valve], options: argparse.Namespace) -> list[Task]:

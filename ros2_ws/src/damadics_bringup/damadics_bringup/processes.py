@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Start the project's nodes as processes and end them again."""
 
+import json
 import os
 import random
 import signal
@@ -11,7 +12,9 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
+from typing import Any
 
+import yaml
 from ament_index_python.packages import PackageNotFoundError, get_package_prefix
 
 
@@ -78,11 +81,31 @@ def parameters(**values: object) -> list[str]:
     >>> parameters(rate=400.0, noise=False)
     ['--ros-args', '-p', 'rate:=400.0', '-p', 'noise:=false']
     """
-    words = ['--ros-args']
+    return ['--ros-args', *assignments(values)]
+
+
+def assignments(values: Mapping[str, Any]) -> list[str]:
+    """
+    Write parameters as YAML values, so that a text stays a text.
+
+    :param values: parameters by name.
+    :return: words of a command line.
+
+    >>> assignments({'noise': True, 'alarm_folder': '', 'actuator': '101'})
+    ['-p', 'noise:=true', '-p', 'alarm_folder:=""', '-p', 'actuator:="101"']
+    """
+    words = []
     for name, value in values.items():
-        text = str(value).lower() if isinstance(value, bool) else str(value)
-        words += ['-p', f'{name}:={text}']
+        words += ['-p', f'{name}:={value if _is_plain(value) else json.dumps(value, default=str)}']
     return words
+
+
+def _is_plain(value: Any) -> bool:
+    """Tell whether YAML reads a text as it is."""
+    try:
+        return isinstance(value, str) and yaml.safe_load(value) == value
+    except yaml.YAMLError:
+        return False
 
 
 class Processes:

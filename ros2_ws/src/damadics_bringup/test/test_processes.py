@@ -7,6 +7,7 @@ import pytest
 from damadics_bringup.processes import (
     ProcessError,
     Processes,
+    assignments,
     executable,
     free_domain,
     parameters,
@@ -16,6 +17,13 @@ from damadics_bringup.processes import (
 def test_parameters_are_written_as_ros_takes_them():
     assert parameters(mode='paper', rate=400.0, noise=True) == [
         '--ros-args', '-p', 'mode:=paper', '-p', 'rate:=400.0', '-p', 'noise:=true',
+    ]
+
+
+def test_a_text_stays_a_text():
+    given = {'alarm_folder': '', 'actuator': '101', 'mode': 'paper', 'limits': [1.0, 2.5]}
+    assert assignments(given)[1::2] == [
+        'alarm_folder:=""', 'actuator:="101"', 'mode:=paper', 'limits:=[1.0, 2.5]',
     ]
 
 
@@ -64,12 +72,12 @@ def test_a_process_that_ignores_signals_is_killed(tmp_path, monkeypatch):
 
 def test_all_processes_end_at_the_same_time_and_none_is_left(tmp_path, monkeypatch):
     script(tmp_path, monkeypatch,
-           '#!/bin/bash\n[ $1 = no ] && trap "" INT\necho ready\nsleep 60\n')
+           '#!/bin/bash\n[ $1 = no ] && trap "" INT\necho ready\nexec sleep 60\n')
     stubborn = [f'stubborn {n}' for n in range(6)]
     with Processes(tmp_path / 'logs') as processes:
         for label in (*stubborn, 'obedient'):
             processes.start('any', 'script', ['no' if label in stubborn else 'yes'], label)
-        while any('ready' not in processes.log(label).read_text() for label in stubborn):
+        while any('ready' not in processes.log(n).read_text() for n in (*stubborn, 'obedient')):
             pass
         began = time.monotonic()
         killed = processes.end_all(patience=0.5, patient_with={'stubborn 0': 0.7})
