@@ -146,6 +146,16 @@ def test_the_layouts_name_topics_and_fields_that_exist():
     named = re.findall(r'"/lv101/(\w+)\.(\w+)"', foxglove)
     named += re.findall(r'(?:name|curve_x|curve_y)="/lv101/(\w+)/(\w+)"', juggler.read_text())
     assert len(named) > 12
+    # as plotjuggler-ros-plugins reads it; curves of other topics would stay empty
+    plugin = ET.parse(juggler).find('Plugins/plugin[@ID="ROS2 Topic Subscriber"]')
+    taken = set(plugin.find('selected_topics').get('value').split(';'))
+    curves = [e.get(k) for e in ET.parse(juggler).iter('curve')
+              for k in ('name', 'curve_x', 'curve_y') if (e.get(k) or '').startswith('/')]
+    assert {curve.rpartition('/')[0] for curve in curves} <= taken
+    panels = json.loads(foxglove)['configById']
+    assert {name.partition('!')[0] for name in panels} == {
+        'Plot', 'StateTransitions', 'RawMessages', 'DiagnosticSummary'}
+    assert all(name in json.dumps(json.loads(foxglove)['layout']) for name in panels)
     for topic, field in named:
         assert field in fields(topic), f'{topic}.{field}'
 
