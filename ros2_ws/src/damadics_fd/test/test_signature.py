@@ -14,7 +14,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from damadics_fd.core import signature_types as st
-from damadics_fd.core.signature import BLOCK, CHANGED, QUIET, Signature
+from damadics_fd.core.signature import Signature
+from damadics_fd.core.signature_step import BLOCK, CHANGED, QUIET
 from damadics_fd.core.signature_types import CAUSES, SignatureSettings
 
 DT = 0.005

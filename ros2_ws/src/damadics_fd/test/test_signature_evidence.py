@@ -5,8 +5,9 @@
 import numpy as np
 import pytest
 from damadics_fd.core import signature_types as st
-from damadics_fd.core.signature_evidence import accumulate, evaluate, joint_change
+from damadics_fd.core.signature_evidence import evaluate, joint_change
 from damadics_fd.core.signature_linalg import cholesky, forward, inverse
+from damadics_fd.core.signature_sums import accumulate
 from damadics_fd.core.signature_types import (
     N_COL,
     N_HYP,

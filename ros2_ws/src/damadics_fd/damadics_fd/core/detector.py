@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from damadics_fd.core import alarm, decision, signature
+from damadics_fd.core import alarm, decision, signature_step
 from damadics_fd.core.estimation import ESTIMATE, Estimate
 from damadics_fd.core.events import Event, events_of
 from damadics_fd.core.jit import jit, layer
@@ -91,8 +91,8 @@ def step(s: Any, c: Any, g: Any, gc: Any, e: Any, d: Any) -> None:
         decision.clear(s)
     cause = g.cause
     ready = e.phase not in (PHASE_PAPER, PHASE_HOLD)
-    signature.step(g, gc, e.stamp, e.x1, e.ps, e.dp, ready, s.active or s.latched)
-    own = signature.own_level(g, gc)
+    signature_step.step(g, gc, e.stamp, e.x1, e.ps, e.dp, ready, s.active or s.latched)
+    own = signature_step.own_level(g, gc)
     d.transitions = alarm.step(s, c, e.stamp, armed or g.own != 0, exceed or own > 0,
                                s.count[0] > 0, max(level, own), ratio)
     if g.cause != cause and s.active:
@@ -122,7 +122,7 @@ def report(s: Any, g: Any, gc: Any, e: Any, d: Any) -> None:
     d.stamp = e.stamp
     d.state = alarm.state_of(s, armed, e.phase)
     d.level = alarm.level_of(s, armed)
-    if s.flag and s.peak < 1.0 and not signature.material(g, gc):
+    if s.flag and s.peak < 1.0 and not signature_step.material(g, gc):
         d.level = alarm.NORMAL  # the approximator is content and the change is small
     d.fault = s.flag
     d.since = s.since

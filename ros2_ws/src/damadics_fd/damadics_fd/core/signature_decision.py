@@ -6,37 +6,30 @@ import math
 from typing import Any
 
 from damadics_fd.core.jit import jit, layer
-from damadics_fd.core.signature_air import restart_air, supply_change
 from damadics_fd.core.signature_cues import stick_evidence
-from damadics_fd.core.signature_evidence import clear_set, evaluate, joint_change, physical_value
+from damadics_fd.core.signature_evidence import evaluate, joint_change, physical_value
+from damadics_fd.core.signature_sums import clear_set
 from damadics_fd.core.signature_types import (
     CAUSE_ELASTIC,
     CAUSE_FRICTION_DOWN,
     CAUSE_FRICTION_UP,
-    CAUSE_NONE,
     CAUSE_PRELOAD,
     CAUSE_SPRING_SOFTER,
     CAUSE_SPRING_STIFFER,
     CAUSE_STICK_PLAY,
-    CAUSE_SUPPLY,
     CAUSE_UNCONFIRMED,
-    CAUSE_UNDETERMINED,
     FAMILY_ELASTIC,
     FAMILY_FRICTION,
-    FAMILY_SUPPLY,
     FAMILY_UNCONFIRMED,
     FAMILY_UNDETERMINED,
     FRICTION,
     N_HYP,
-    N_SETS,
     PRELOAD,
     SET_ALARM,
     SET_FAST,
     SET_SLOW,
     SPRING,
-    STATE_ALARM,
     STATE_MONITOR,
-    STATE_VERIFY,
 )
 
 SECOND = 1_000_000_000  # [ns]
@@ -47,96 +40,11 @@ NULL_D = 15.0  # less evidence of the moving stem than this is none
 FLIP = 10  # evaluated blocks in a row that overturn a firm family
 P_LONG = 0.99  # names a family by the long record alone
 P_STICK = 0.96
-P_SUPPLY = 0.95
 STAGE2_EVIDENCE = 30.0
 STAGE2_STRIDE = 5
+SETTLED = 30.0  # [s] after the alarm: from then on the long record sizes a friction change
+STRONG = 1.0  # friction change of which the long record begins anew then
 D_VERIFY = 12.0  # largest D expected of a right model
-
-
-@jit
-def forget_cause(s: Any) -> None:
-    """
-    Set value, deviation and confidence to 0: unknown.
-
-    :param s: state record.
-    """
-    s.cause_value = 0.0
-    s.cause_std = 0.0
-    s.confidence = 0.0
-
-
-@jit
-def start_alarm(s: Any) -> None:
-    """
-    Begin to collect evidence on an alarm.
-
-    :param s: state record.
-    """
-    s.state = STATE_ALARM
-    s.since = s.t
-    s.alarm_t = s.t
-    s.b_p_until = s.t
-    s.n_alarm = 0.0
-    s.stage2 = 0
-    s.run_f = 0
-    s.run_e = 0
-    s.family = FAMILY_UNDETERMINED
-    s.cause = CAUSE_UNDETERMINED
-    s.second = 0
-    forget_cause(s)
-    s.r_max = 0.0
-    s.stick = 0
-    clear_set(s, SET_ALARM)
-
-
-@jit
-def start_supply_alarm(s: Any, c: Any) -> None:
-    """
-    Raise the own alarm on a loss of supply pressure.
-
-    :param s: state record.
-    :param c: settings record.
-    """
-    start_alarm(s)
-    s.own = 1
-    s.own_t = s.t
-    s.family = FAMILY_SUPPLY
-    s.cause = CAUSE_SUPPLY
-    s.cause_value = supply_change(s, c)
-    s.confidence = P_SUPPLY
-
-
-@jit
-def end_alarm(s: Any) -> None:
-    """
-    Go back to monitoring (or verifying) with empty sums.
-
-    :param s: state record.
-    """
-    s.own = 0
-    s.own_t = 0
-    s.family = FAMILY_UNDETERMINED
-    s.cause = CAUSE_NONE
-    forget_cause(s)
-    s.r_max = 0.0
-    s.stick = 0
-    restart_sets(s)
-    restart_air(s)
-    s.state = STATE_MONITOR if s.verified else STATE_VERIFY
-    s.since = s.t
-
-
-@jit
-def restart_sets(s: Any) -> None:
-    """
-    Empty all accumulators.
-
-    :param s: state record.
-    """
-    for m in range(N_SETS):
-        clear_set(s, m)
-        s.d_max[m] = 0.0
-    s.n_moving = 0
 
 
 @jit
@@ -206,14 +114,14 @@ def decide(s: Any, c: Any) -> None:
         elif s.run_e >= (FLIP if s.family == FAMILY_FRICTION else c.n_firm):
             s.family = FAMILY_ELASTIC
         if s.family == FAMILY_FRICTION and p_f > 0.5:
-            if D - 2.0 * b_r < NULL_D:
+            if moving_unchanged(s, c, D - 2.0 * b_r):
                 name_stick(s, p_f)
             else:
                 name_friction(s, m, p_f)
         elif s.family == FAMILY_ELASTIC and p_f < 0.5:
             name_elastic(s, c, m, 1.0 - p_f)
-    elif (
-        s.n_alarm >= NULL_MOVING and D - 2.0 * b_r < NULL_D and s.r_max > NULL_STICK * s.r_ref
+    elif s.r_max > NULL_STICK * s.r_ref and s.n_alarm >= NULL_MOVING and moving_unchanged(
+        s, c, D - 2.0 * b_r
     ):
         s.run_e = 0
         s.run_f += 1
@@ -225,6 +133,21 @@ def decide(s: Any, c: Any) -> None:
         s.run_e = 0
         doubt(s, c)
     second_stage(s, c)
+
+
+@jit
+def moving_unchanged(s: Any, c: Any, D: float) -> bool:
+    """
+    Tell whether the moving stem shows no change, neither of late nor on the long record.
+
+    :param s: state record.
+    :param c: settings record.
+    :param D: evidence of the moving stem on the short record.
+    :return: True if only the standing stem can explain the alarm.
+    """
+    long = s.stage2 != 0 and s.D[SET_SLOW] > c.d_decide
+    unchanged: bool = D < NULL_D and not long
+    return unchanged
 
 
 @jit
@@ -265,6 +188,8 @@ def name_friction(s: Any, m: int, p: float) -> None:
     :param p: posterior of friction.
     """
     s.confidence = p
+    if s.stage2 == 2 and s.D[SET_SLOW] > 0.0:
+        m = SET_SLOW  # as the last stage 2 left it
     s.cause_value = s.value[m][FRICTION]
     s.cause_std = s.sd[m][FRICTION]
     s.cause = CAUSE_FRICTION_UP if s.cause_value >= 0.0 else CAUSE_FRICTION_DOWN
@@ -332,6 +257,11 @@ def second_stage(s: Any, c: Any) -> None:
             s.stage2 = 1
             clear_set(s, SET_SLOW)
         return
+    settled = (s.t - s.alarm_t) * 1e-9 >= SETTLED
+    if s.stage2 == 1 and s.family == FAMILY_FRICTION and settled:
+        s.stage2 = 2
+        if abs(s.cause_value) > STRONG:
+            clear_set(s, SET_SLOW)  # it holds the growth of the fault; of a small one all counts
     m = SET_SLOW
     s.due[m] += 1
     if s.due[m] < STAGE2_STRIDE or s.ne[m] < STAGE2_EVIDENCE:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from damadics_fd.core.jit import jit
 from damadics_fd.core.signature_linalg import cholesky, forward, inverse
+from damadics_fd.core.signature_sums import growth_time
 from damadics_fd.core.signature_types import (
     DP_OFFSET,
     FRICTION,
@@ -45,62 +46,6 @@ JOINT_COLUMNS = np.array([X1, ONE, SIGN, V])
 MIN_EVIDENCE = 4.0  # blocks
 CONFLICT = 3.0  # log odds of the moving stem against friction that outweigh the stick range
 SMALL = 2e-3  # [1] tolerance of the exclusions
-
-
-@jit
-def clear_set(s: Any, m: int) -> None:
-    """
-    Empty one accumulator.
-
-    :param s: state record.
-    :param m: index of the set.
-    """
-    s.S[m][:, :] = 0.0
-    s.q[m][:] = 0.0
-    s.rr[m] = 0.0
-    s.ne[m] = 0.0
-    s.vb[m] = 0.0
-    s.D[m] = 0.0
-    s.due[m] = 0
-    s.over[m] = 0
-
-
-@jit
-def accumulate(s: Any, m: int, forget: float, r: float) -> None:
-    """
-    Add the block under evaluation to one accumulator.
-
-    :param s: state record.
-    :param m: index of the set.
-    :param forget: l = 1 - 1/N; 1 to remember everything.
-    :param r: what the columns have to explain.
-    """
-    S = s.S[m]
-    q = s.q[m]
-    ph = s.ph
-    w = s.w
-    for i in range(N_COL):
-        a = w * ph[i]
-        for j in range(N_COL):
-            S[i, j] = forget * S[i, j] + a * ph[j]
-        q[i] = forget * q[i] + a * r
-    s.rr[m] = forget * s.rr[m] + w * r * r
-    s.ne[m] = forget * s.ne[m] + w
-    s.vb[m] = forget * s.vb[m] + w * abs(s.v)
-
-
-@jit
-def residual(s: Any) -> float:
-    """
-    Return what the reference does not explain of the force of the block.
-
-    :param s: state record.
-    :return: r = u - phi' theta0.
-    """
-    r: float = s.u
-    for i in range(N_REF):
-        r -= s.ph[i] * s.theta[i]
-    return r
 
 
 @jit
@@ -165,18 +110,6 @@ def cross_information(s: Any, m: int, iv: float, i: int, j: int) -> float:
     for k in range(N_REF):
         a -= s.Y[0, k, i] * s.Y[0, k, j]
     return a
-
-
-@jit
-def growth_time(s: Any) -> float:
-    """
-    Return the time that growing changes are counted in.
-
-    :param s: state record.
-    :return: [10 s] since the alarm, at most 3.
-    """
-    since = (s.t - s.alarm_t) * 1e-10
-    return max(0.0, min(3.0, since))
 
 
 @jit

@@ -13,8 +13,8 @@ from typing import Any
 
 from damadics_fd.core.jit import jit
 from damadics_fd.core.signature_air import forget_air
-from damadics_fd.core.signature_evidence import accumulate, clear_set
 from damadics_fd.core.signature_linalg import inverse
+from damadics_fd.core.signature_sums import accumulate, clear_set
 from damadics_fd.core.signature_types import (
     N_REF,
     N_TABLE,
@@ -46,6 +46,7 @@ def start_learning(s: Any, c: Any) -> None:
     for i in range(TABLE):
         s.theta[i] = c.theta_nominal[i]
     clear_set(s, SET_ALARM)
+    s.n_learn = 0.0
     s.n_up = 0
     s.n_down = 0
     s.x_low = 1.0
@@ -101,6 +102,21 @@ def finish_learning(s: Any, c: Any) -> bool:
         if (s.t - s.t0) * 1e-9 >= 2.0 * c.learn:
             s.state = STATE_INSUFFICIENT
         return False
+    if not solve_reference(s, c):
+        return False
+    s.r_ref = max(s.r_max, max(2.4 * s.theta[SIGN], STICK_FLOOR))
+    return True
+
+
+@jit
+def solve_reference(s: Any, c: Any) -> bool:
+    """
+    Compute the reference from the sums over the fault-free valve.
+
+    :param s: state record; theta, J0, sigma and n_learn are written.
+    :param c: settings record.
+    :return: False where the sums are not usable.
+    """
     S, q, wn = s.S[SET_ALARM], s.q[SET_ALARM], s.ne[SET_ALARM]
     H, work, prior = s.Gm[0], s.L[0], s.Y[0]
     n = len(s.theta)
@@ -134,8 +150,7 @@ def finish_learning(s: Any, c: Any) -> bool:
     for i in range(n):
         for j in range(n):
             s.J0[i, j] = H[i, j]
-    s.r_ref = max(s.r_max, max(2.4 * s.theta[SIGN], STICK_FLOOR))
-    clear_set(s, SET_ALARM)
+    s.n_learn = wn
     return True
 
 

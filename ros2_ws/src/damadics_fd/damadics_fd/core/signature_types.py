@@ -238,7 +238,8 @@ STATE_DTYPE = _record(
         ('moving', 'i8'), ('standing', 'i8'), ('x', 'f8'), ('u', 'f8'), ('v', 'f8'), ('w', 'f8'),
         ('ph', 'f8', (N_COL,)),
         # LEARN
-        ('n_up', 'i8'), ('n_down', 'i8'), ('x_low', 'f8'), ('x_high', 'f8'), ('n_moving', 'i8'),
+        ('n_learn', 'f8'), ('n_up', 'i8'), ('n_down', 'i8'), ('x_low', 'f8'), ('x_high', 'f8'),
+        ('n_moving', 'i8'),
         # accumulators
         ('S', 'f8', (N_SETS, N_COL, N_COL)), ('q', 'f8', (N_SETS, N_COL)),
         ('rr', 'f8', (N_SETS,)), ('ne', 'f8', (N_SETS,)), ('vb', 'f8', (N_SETS,)),
