@@ -50,8 +50,9 @@ class DetectorNode(MonitoringNode):
         self._fault_flag = self.create_publisher(FaultFlag, 'fault_flag', qos.FLAG)
         self._fault_event = self.create_publisher(FaultEvent, 'fault_event', qos.EVENTS)
         self._rival = RivalWatch(self, self.refuse)
-        self._signature = SignaturePublisher(self, self._core.signature, self.actuator,
-                                             self.settings, self._signature_folder)
+        self._signature = SignaturePublisher(
+            self, self._core.signature, self.actuator, self.settings,
+            self._folder_of(self._signature_folder, self._valve()), self._causes.limits)
         OperatorServices(self, self._core, self._operated)
         self._was_silent = True
         self.start()
@@ -71,7 +72,8 @@ class DetectorNode(MonitoringNode):
         self._causes = read_causes(self.parameters.declare(
             'causes_file', '', 'YAML file with texts and advice per cause; "": the own ones'))
         self._signature_folder = self.parameters.declare(
-            'signature_folder', '', 'folder that keeps signature and trends over a restart')
+            'signature_folder', 'auto', 'folder that keeps signature and trends over a restart; '
+            '"auto": beside the alarms, in mode paper none; "": none')
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Begin afresh, with the alarms from before where they are kept."""
@@ -90,11 +92,17 @@ class DetectorNode(MonitoringNode):
         return super().on_configure(state)
 
     def _make_store(self) -> AlarmStore | None:
-        if not self._folder or (self._folder == 'auto' and self.settings.mode == 'paper'):
+        folder = self._folder_of(self._folder)
+        return AlarmStore(folder / f'{self._valve()}.alarm.json') if folder else None
+
+    def _folder_of(self, given: str, own: str = '') -> Path | None:
+        """Return the folder that a parameter means; `own` is the part of this valve in `auto`."""
+        if not given or (given == 'auto' and self.settings.mode == 'paper'):
             return None
-        folder = default_folder() if self._folder == 'auto' else Path(self._folder).expanduser()
-        name = self.get_namespace().strip('/').replace('/', '__') or 'root'
-        return AlarmStore(folder / f'{name}.alarm.json')
+        return default_folder() / own if given == 'auto' else Path(given).expanduser()
+
+    def _valve(self) -> str:
+        return self.get_namespace().strip('/').replace('/', '__') or 'root'
 
     def _take(self, message: EstimateMessage) -> None:
         if not self.active:
@@ -109,6 +117,7 @@ class DetectorNode(MonitoringNode):
         elif before is not None and estimate.stamp == before.stamp:
             self._twice += 1  # two estimators send
             return
+        self._signature.begin(estimate.stamp)
         learns = self._phase == PHASE_MONITOR and estimate.phase < PHASE_MONITOR
         if learns and not self._was_silent:
             self._core.signature.relearn()  # somebody had the valve learned afresh
@@ -180,6 +189,7 @@ class DetectorNode(MonitoringNode):
             'Estimates judged': self._judged,
             'Estimates received twice': self._twice,
             'NE 107': NE107[decision.level],
+            **self._signature.values,
         }
         if self.watch.silent:
             return Level.ERROR, 'estimates have stopped: not monitoring', values

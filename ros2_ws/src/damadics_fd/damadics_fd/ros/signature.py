@@ -4,6 +4,8 @@
 
 import hashlib
 import json
+import math
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +19,9 @@ from damadics_fd.core.signature import Signature
 from damadics_fd.core.signature_decision import own_alarm_ready
 from damadics_fd.reference import Reference, load_reference, save_reference
 from damadics_fd.ros import qos
+from damadics_fd.ros.alarm_store import another_run
 from damadics_fd.ros.spin import StartError
-from damadics_fd.trends import TrendFile
+from damadics_fd.trends import QUANTITIES, Outlook, TrendFile
 
 PERIOD = 1_000_000_000  # ns of measurement time between two messages without news
 
@@ -45,17 +48,21 @@ class SignaturePublisher:
     :param signature: of its core.
     :param actuator: tag; also names the files.
     :param settings: that the signature was learned with.
-    :param folder: keeps the learned signature and its trends over a restart; empty for none.
+    :param folder: keeps the learned signature and its trends over a restart; None for none.
+    :param limits: of the trends, per quantity.
     """
 
     def __init__(self, node: Node, signature: Signature, actuator: str, settings: Settings,
-                 folder: str = '') -> None:
+                 folder: Path | None, limits: Mapping[str, Sequence[float]]) -> None:
         self._node = node
         self._signature = signature
         self._actuator = actuator
         self._settings = settings
-        self._folder = Path(folder).expanduser() if folder else None
+        self._folder = folder
+        self._limits = limits
         self._trend: TrendFile | None = None
+        self._outlook: list[Outlook] = []
+        self._restored: int | None = None  # stamp of the reference that was taken up
         self._saved: dict[str, Any] = {}
         self._last: tuple[int, ...] = ()
         self._next = 0
@@ -69,9 +76,31 @@ class SignaturePublisher:
             kept = load_reference(self._path(self._folder), self._actuator, self._settings)
             self._signature.load(kept.signature)
             self._saved = kept.signature
+            self._restored = kept.last_stamp
             self._node.get_logger().info(f'signature of before taken up from {self._folder}')
         except ValueError as problem:
             self._node.get_logger().info(f'the signature is learned anew: {problem}')
+
+    def begin(self, stamp: int) -> None:
+        """
+        Learn anew where the signature of before belongs to another simulated run.
+
+        :param stamp: of a measurement that is about to be judged [ns].
+        """
+        if self._restored is None:
+            return
+        if another_run(self._restored, stamp):
+            self._node.get_logger().info('time begins anew: the signature is learned anew')
+            self._signature.relearn()
+            self._saved = {}
+        self._restored = None
+
+    @property
+    def values(self) -> dict[str, str]:
+        """Cause and outlook of each trend, for the diagnostics."""
+        view = self._signature.view()
+        return {'Cause': view.cause.replace('_', ' '),
+                **{f'Trend of {o.quantity}': o.sentence() for o in self._outlook}}
 
     def update(self, header: Header, stamp: int) -> None:
         """
@@ -85,7 +114,6 @@ class SignaturePublisher:
         if present == self._last and self._next - PERIOD <= stamp < self._next:
             return
         self._last, self._next = present, stamp + PERIOD
-        self._publisher.publish(signature_message(self._signature, header))
         if self._folder and s.verified:
             try:
                 self._keep(self._folder, stamp)
@@ -93,6 +121,10 @@ class SignaturePublisher:
                 self._node.get_logger().error(
                     f'signature and trend are not kept: {problem}; check folder and free space',
                     throttle_duration_sec=60.0)
+        self._outlook = self._trend.outlook(self._limits, stamp * 1e-9) if self._trend else []
+        message = signature_message(self._signature, header)
+        write_outlook(self._outlook, message)
+        self._publisher.publish(message)
 
     def _keep(self, folder: Path, stamp: int) -> None:
         s = self._signature.state[0]
@@ -100,7 +132,8 @@ class SignaturePublisher:
             saved = self._signature.save()
             if saved != self._saved:
                 save_reference(self._path(folder), Reference(
-                    self._actuator, {}, self._settings.to_dict(), saved, source='live'))
+                    self._actuator, {}, self._settings.to_dict(), saved, source='live',
+                    last_stamp=stamp))
                 self._saved = saved
             name = hashlib.sha256(json.dumps(saved['theta']).encode()).hexdigest()[:16]
             self._trend = TrendFile(folder, self._actuator, name)
@@ -135,3 +168,20 @@ def signature_message(signature: Signature, header: Header) -> SignatureMessage:
     elif s.state == SignatureMessage.STATE_ALARM:
         message.source = SignatureMessage.SOURCE_APPROXIMATOR
     return message
+
+
+def write_outlook(outlook: Sequence[Outlook], message: SignatureMessage) -> None:
+    """
+    Write the time that each trend takes to its limit.
+
+    :param outlook: of the trends that have enough points.
+    :param message: written.
+    """
+    names = ('trend', 'limit', 'time_to_limit', 'time_to_limit_earliest', 'time_to_limit_latest')
+    columns = {name: [math.nan] * len(QUANTITIES) for name in names}
+    for o in outlook:
+        row = (o.trend.slope * 86400.0, o.limit, o.time.expected, o.time.earliest, o.time.latest)
+        for name, value in zip(names, row, strict=True):
+            columns[name][QUANTITIES.index(o.quantity)] = value
+    for name, values in columns.items():
+        setattr(message, name, values)
