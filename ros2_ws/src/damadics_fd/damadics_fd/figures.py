@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from damadics_fd.core.modes import PHASE_MONITOR, PHASE_PAPER
 from damadics_fd.core.pipeline import Result
 
 POINTS = 3000  # per curve: more than a page can show
@@ -84,9 +85,13 @@ def six_panels(
         layout = ConstrainedLayoutEngine(w_pad=0.08, h_pad=0.07, hspace=0.04, wspace=0.03)
         figure = Figure(figsize=(11.5, 8.6), layout=layout)
         axes = figure.subplots(3, 2, sharex=True)
-        _error(axes[0, 0], t, result.estimates['xi1'], r'position error  $\xi_1$  [stroke]')
-        _error(axes[0, 1], t, result.estimates['xi2'], r'velocity error  $\xi_2$  [stroke/s]')
+        armed = np.isin(result.estimates['phase'], (PHASE_MONITOR, PHASE_PAPER))
+        _error(axes[0, 0], t, result.estimates['xi1'], armed, r'position error  $\xi_1$', 'stroke')
+        _error(axes[0, 1], t, result.estimates['xi2'], armed, r'velocity error  $\xi_2$',
+               'stroke/s')
         _residual(axes[1, 0], t, result.decisions)
+        for axis, text in ((axes[1, 0], ''), (axes[2, 0], 'no decision yet')):
+            _learning(axis, t, armed, text)
         onset = _strength(axes[1, 1], t, columns)
         _decision(axes[2, 0], t, result, zero, onset)
         _valve(axes[2, 1], t, columns)
@@ -107,11 +112,33 @@ def six_panels(
     return path
 
 
-def _error(axis: Any, t: NDArray, error: NDArray, title: str) -> None:
+def _error(
+    axis: Any, t: NDArray, error: NDArray, armed: NDArray[np.bool_], title: str, unit: str,
+) -> None:
+    """Draw an error, scaled so that its ticks are short; what precedes the decision may leave."""
+    known = np.isfinite(error)
+    judged = error[armed & known] if armed.any() else error[known]
+    largest = float(np.abs(judged).max(initial=0.0))
+    exponent = int(np.floor(np.log10(largest))) if largest > 0.0 else 0
+    if -2 < exponent < 3:
+        exponent = 0
+    else:
+        unit = f'$10^{{{exponent}}}$ {unit}'
     axis.axhline(0.0, color='#c9ced6', linewidth=0.8)
-    axis.plot(*envelope(t, error), color=BLUE)
-    axis.ticklabel_format(axis='y', style='plain')
-    axis.set_title(title)
+    axis.plot(*envelope(t, error / 10.0**exponent), color=BLUE)
+    if len(judged) < len(error) and largest > 0.0:
+        reach = 1.6 * largest / 10.0**exponent
+        low, high = axis.get_ylim()
+        axis.set_ylim(max(low, -reach), min(high, reach))
+    axis.set_title(f'{title}  [{unit}]')
+
+
+def _learning(axis: Any, t: NDArray, armed: NDArray[np.bool_], text: str) -> None:
+    """Shade the time before the first decision."""
+    first = int(armed.argmax()) if armed.any() else len(t) - 1
+    if first > 0:
+        axis.axvspan(t[0], t[first], color='#f1f2f5', linewidth=0, zorder=0)
+        axis.text(0.5 * (t[0] + t[first]), 0.35, text, color=GREY, ha='center', clip_on=True)
 
 
 def _residual(axis: Any, t: NDArray, decisions: NDArray) -> None:
@@ -157,10 +184,8 @@ def _strength(axis: Any, t: NDArray, columns: Mapping[str, NDArray]) -> float | 
 def _decision(axis: Any, t: NDArray, result: Result, zero: int, onset: float | None) -> None:
     fault = result.decisions['fault'].astype(float)
     when, flag = envelope(t, fault)
-    for color, part in (
-        (GREY, when < (t[0] if onset is None else onset)),
-        (RED, when >= (t[0] if onset is None else onset)),
-    ):
+    counts = when >= (t[0] if onset is None else onset)
+    for color, part in ((GREY, ~counts), (RED if fault.any() else GREY, counts)):
         axis.fill_between(when[part], flag[part], color=color, alpha=0.25, linewidth=0)
         axis.plot(when[part], flag[part], color=color, linewidth=1.3)
     axis.set_title('decision')
@@ -169,8 +194,8 @@ def _decision(axis: Any, t: NDArray, result: Result, zero: int, onset: float | N
     times = np.array([(event.stamp - zero) * 1e-9 for event in result.detections])
     early = times[times < onset] if onset is not None else times[:0]
     after = times[times >= onset] if onset is not None else times
-    axis.plot(early, np.full(len(early), 1.1), 'v', color=GREY, markersize=5, clip_on=False)
     if len(early):
+        axis.plot(early, np.full(len(early), 1.1), 'v', color=GREY, markersize=5, clip_on=False)
         axis.text(float(early[0]), 1.19, f'before the fault: {len(early)}', color=GREY, fontsize=9)
     if len(after):
         first = float(after[0])
@@ -181,12 +206,13 @@ def _decision(axis: Any, t: NDArray, result: Result, zero: int, onset: float | N
                       fontweight='bold',
                       bbox={'color': 'white', 'pad': 1.0})
     if not len(times):
-        axis.text(0.5, 0.5, 'no fault flagged', color=GREY, ha='center', transform=axis.transAxes)
+        axis.text(0.5, 0.6, 'no fault flagged', color=GREY, ha='center', transform=axis.transAxes)
 
 
 def _valve(axis: Any, t: NDArray, columns: Mapping[str, NDArray]) -> None:
     axis.plot(*envelope(t, columns['cv']), color=GREY, linewidth=1.2, label='CV')
     axis.plot(*envelope(t, columns['x1']), color=BLUE, linewidth=1.5, label='X')
     axis.set_ylim(-0.05, 1.3)
-    axis.legend(loc='upper right', ncols=2, borderaxespad=0.1)
+    axis.legend(loc='upper right', ncols=2, borderaxespad=0.1, frameon=True, framealpha=1.0,
+                edgecolor='none', facecolor='white')
     axis.set_title('control value CV and stem position X  [stroke]')
