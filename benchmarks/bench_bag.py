@@ -25,24 +25,20 @@ from pathlib import Path
 import numpy as np
 from damadics_fd.bag import BagWriter, iter_columns, read_columns, write_columns
 from damadics_fd.bag.rosbag2 import qos
+from damadics_plant import simulate
 from numpy.typing import NDArray
 
 SLOW_ROWS = 40_000  # read by the peers
 ROWS = 400_000
+RATE = 200.0  # [Hz]
+SIGNALS = ('stamp', 'cv', 'x1', 'p1', 'p2', 't1', 'flow', 'ps')
 MEASUREMENT = 'damadics_msgs/msg/Measurement'
 
 
-def recording(n: int, start: int = 0) -> dict[str, np.ndarray]:
-    """Return columns of a noisy valve at 200 Hz."""
-    rng = np.random.default_rng(start)
-    stamp = (np.arange(start, start + n) + 1) * 5_000_000
-    t = stamp / 1e9
-    x1 = 0.5 + 0.3 * np.sin(0.3 * t) + 1e-3 * rng.standard_normal(n)
-    return {
-        'stamp': stamp, 'cv': np.round(t / 20) % 2, 'x1': x1,
-        'p1': 3.5e6 + 1e4 * np.sin(t), 'p2': 2.6e6 + 1e4 * np.sin(t), 't1': np.full(n, 20.0),
-        'flow': 8 + np.sin(0.3 * t), 'ps': 1.4e5 + 6e4 * np.sin(0.3 * t),
-    }
+def recording(n: int) -> dict[str, np.ndarray]:
+    """Return the measurements of a simulated healthy valve with noisy sensors at 200 Hz."""
+    run = simulate('nominal', RATE, 'lugre', noise=True, duration=n / RATE)
+    return {name: run[name][:n] for name in SIGNALS}
 
 
 def spent(task: Callable[[], object], repeats: int) -> NDArray[np.float64]:
@@ -109,12 +105,13 @@ def memory(folder: Path) -> None:
     print(f'\n{"samples":>12}{"bag":>12}{"peak memory":>16}')
     for factor in (1, 10, 100):
         path = folder / f'{factor}.mcap'
+        columns = recording(SLOW_ROWS)
+        stamp = columns.pop('stamp')
         with BagWriter(path) as bag:
             bag.add_topic('/measurement', MEASUREMENT, [qos()])
-            for start in range(0, 40_000 * factor, 40_000):
-                columns = recording(40_000, start)
-                stamp = columns.pop('stamp')
-                bag.write_columns(stamp, {'/measurement': columns}, 'LC74_20')
+            for part in range(factor):
+                later = part * SLOW_ROWS * round(1e9 / RATE)
+                bag.write_columns(stamp + later, {'/measurement': columns}, 'LC74_20')
         code = (
             'import sys, resource; from damadics_fd.replay import main;'
             'main([sys.argv[1], "--mode", "monitor", "--figures", sys.argv[2]]);'
@@ -123,7 +120,7 @@ def memory(folder: Path) -> None:
         out = subprocess.run([sys.executable, '-c', code, str(path), str(folder / 'figures')],
                              capture_output=True, text=True, check=True).stdout
         peak = float(out.split('peak')[-1])
-        print(f'{40_000 * factor:12,}{path.stat().st_size / 1e6:9.1f} MB{peak:13.0f} MB')
+        print(f'{SLOW_ROWS * factor:12,}{path.stat().st_size / 1e6:9.1f} MB{peak:13.0f} MB')
 
 
 PUBLISHER = """

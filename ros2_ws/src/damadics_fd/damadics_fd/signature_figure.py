@@ -25,6 +25,7 @@ from damadics_fd.figures import BLUE, GREY, INK, ORANGE, STYLE
 Array = NDArray[np.float64]
 MIN_SHARE = 0.75  # of the samples of a block
 POINTS = 4000  # blocks of each kind in a picture
+MOST_BLOCKS = 100_000  # kept; beyond, every second piece of the older half is left out
 
 
 class ForceMap:
@@ -41,6 +42,7 @@ class ForceMap:
         self._signature = signature
         self._rest: NDArray[Any] | None = None
         self._blocks: list[Array] = []
+        self._count = 0
 
     def add(self, estimates: NDArray[Any]) -> None:
         """
@@ -67,6 +69,11 @@ class ForceMap:
         means = np.add.reduceat(columns, first) / count[:, None]
         whole = count >= MIN_SHARE * c.block / c.sample_period
         self._blocks.append(means[whole & np.isfinite(means).all(axis=1)])
+        self._count += len(self._blocks[-1])
+        if self._count > MOST_BLOCKS:
+            half = len(self._blocks) // 2
+            self._blocks = [*self._blocks[:half:2], *self._blocks[half:]]
+            self._count = sum(map(len, self._blocks))
 
     def moving(self) -> tuple[Array, Array, Array, Array, Array]:
         """

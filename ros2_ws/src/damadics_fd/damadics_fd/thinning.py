@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from damadics_fd.bag.decoder import Columns
 from damadics_fd.core.pipeline import Result
 
-MOST_ROWS = 200_000  # kept, before they are thinned further
+MOST_ROWS = 60_000  # kept, before they are thinned further
 KEPT = 11  # rows of a block at most: its first, and the extremes of five signals
 STEP = 8  # by which blocks grow
 DRAWN = ('cv', 'x1', 'fault', 'strength')
@@ -62,16 +62,20 @@ class Thinner:
 
 
 def _extremes(columns: Columns, result: Result, block: int) -> NDArray[np.intp]:
-    """Return the rows to keep, in order."""
-    whole = len(columns['stamp']) // block * block
+    """Return the rows to keep, in order; what is left behind whole blocks is a block, too."""
+    count = len(columns['stamp'])
+    whole = count // block * block
     first = np.arange(0, whole, block)
-    keep = [first, np.arange(whole, len(columns['stamp']))]
+    keep = [first, np.arange(whole, min(whole + 1, count))]
     for signal in (
         result.estimates['xi1'], result.estimates['xi2'], result.decisions['residual'],
         columns['x1'], columns['cv'],
     ):
-        rows = np.nan_to_num(signal[:whole]).reshape(-1, block)
-        keep += [first + rows.argmin(1), first + rows.argmax(1)]
+        values = np.nan_to_num(signal)
+        blocks = values[:whole].reshape(len(first), min(block, count))
+        keep += [first + blocks.argmin(1), first + blocks.argmax(1)]
+        if whole < count:
+            keep.append(whole + np.array([values[whole:].argmin(), values[whole:].argmax()]))
     changes = np.flatnonzero(np.diff(result.decisions['fault'].astype(np.int8)))
     keep += [changes, changes + 1, np.flatnonzero(result.decisions['transitions'])]
     return np.unique(np.concatenate(keep))

@@ -4,7 +4,11 @@
 
 import numpy as np
 import pytest
-from damadics_fd.core.pipeline import run
+from damadics_fd import thinning
+from damadics_fd.core.detector import DECISION, Detector
+from damadics_fd.core.estimation import ESTIMATE
+from damadics_fd.core.estimator import Estimator
+from damadics_fd.core.pipeline import Result, run
 from damadics_fd.core.settings import Settings
 from damadics_fd.figures import envelope, six_panels
 
@@ -34,3 +38,30 @@ def test_six_panels_are_drawn_with_and_without_the_truth(tmp_path, known):
     path = six_panels(result, columns, tmp_path / 'new' / 'a.png', 'a title')
     assert path.read_bytes().startswith(b'\x89PNG')
     assert path.stat().st_size > 50_000
+
+
+def test_rows_kept_for_a_picture_stay_few_and_hold_every_spike(monkeypatch):
+    monkeypatch.setattr(thinning, 'MOST_ROWS', 2000)
+    settings = Settings.for_mode('paper')
+    thinner, rng, spikes, most = thinning.Thinner(), np.random.default_rng(1), [], 0
+    for piece in range(600):
+        rows = int(rng.integers(50, 400))
+        stamp = (piece * 1000 + np.arange(rows)) * 1_000_000 + 1
+        columns = {'stamp': stamp, 'cv': np.zeros(rows), 'x1': rng.random(rows)}
+        result = Result(np.zeros(rows, np.uint8), np.zeros(rows, ESTIMATE),
+                        np.zeros(rows, DECISION), Estimator(settings), Detector(settings))
+        if piece % 50 == 7:
+            spike = int(rng.integers(rows))
+            result.estimates['xi2'][spike] = 5.0 + piece
+            result.decisions['transitions'][rows // 2] = 1
+            spikes.append((stamp[spike], 5.0 + piece, stamp[rows // 2]))
+        thinner.add(columns, result)
+        most = max(most, len(thinner.thinned()[0].reason))
+    result, columns = thinner.thinned()
+    assert most < 2500
+    assert (np.diff(columns['stamp']) > 0).all()
+    for stamp, height, event in spikes:
+        row = np.searchsorted(columns['stamp'], stamp)
+        assert columns['stamp'][row] == stamp
+        assert result.estimates['xi2'][row] == height
+        assert event in columns['stamp']

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 import numpy as np
 import pytest
+from damadics_fd import signature_figure
 from damadics_fd.core.signature import Signature
 from damadics_fd.core.signature_types import SignatureSettings
 from damadics_fd.signature_figure import ForceMap, force_over_position
@@ -35,6 +36,17 @@ def test_blocks_do_not_depend_on_the_pieces_and_hold_the_force():
     friction = force - C.force_scale * (x + C.preload)
     assert len(x) > 300
     np.testing.assert_allclose(friction, 25.0 * np.sign(v), atol=0.5)
+
+
+def test_blocks_of_long_recordings_stay_few_with_the_first_and_the_latest(monkeypatch):
+    monkeypatch.setattr(signature_figure, 'MOST_BLOCKS', 400)
+    data, force_map = rows(200.0), ForceMap(Signature(C))
+    for first in range(0, len(data), 777):
+        force_map.add(data[first:first + 777])
+    t, *_ = force_map.moving()
+    assert 100 < len(t) <= 400
+    assert t[0] < 1.0
+    assert (t > 185.0).sum() > 100
 
 
 def test_picture_is_written_and_nothing_learned_is_refused(tmp_path):
