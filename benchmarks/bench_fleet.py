@@ -127,21 +127,24 @@ def measure(options: argparse.Namespace, folder: Path) -> None:
             counts.spin(0.2)
             processes.check()
         website.wait_until_served(f'http://127.0.0.1:{port}')
-        plants = [task for task in tasks if task.executable == 'plant']
-        for task in plants:
-            start(task)
-        while not counts.values[f'{valves[-1].name}/detector'].get('Estimates judged'):
-            counts.spin(0.2)
         page = None
         if chromium:
             page = chromium.new_page(viewport={'width': 1440, 'height': 960})
             page.goto(f'http://127.0.0.1:{port}/valve/{valves[0].name}')
-            page.wait_for_function('window.damadics && damadics.messages > 5')
+        plants = [task for task in tasks if task.executable == 'plant']
+        for task in plants:
+            start(task)
+        while any(counts.values[f'{v.name}/detector'].get('Estimates judged', '0') == '0'
+                  for v in valves):
+            counts.spin(0.2)
+        if chromium:
             kinds['browser'] = browser_processes()
         counts.spin(WARM_UP)
         began, before = time.monotonic(), cpu_times(kinds)
         shown = page.evaluate('damadics.messages') if page else 0
         counts.spin(options.seconds / 2.0)
+        if any(processes.ended(task.label) for task in plants):
+            raise SystemExit('the plants ended while CPU time was measured: more --seconds')
         span = time.monotonic() - began
         used = {kind: value - before[kind] for kind, value in cpu_times(kinds).items()}
         updates = (page.evaluate('damadics.messages') - shown) / span if page else 0.0
