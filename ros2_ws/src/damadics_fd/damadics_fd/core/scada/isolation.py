@@ -177,6 +177,7 @@ class Isolator:
         self._ref = reference
         self._stem = np.zeros(1, STEM)
         tests = [test.residual for test in TESTS]
+        self._mean_t1 = float(reference['mu'][tests.index(T1)])
         self._nominal = (math.nan, math.nan)
         self._late = False
         self._variance = (
@@ -237,15 +238,15 @@ class Isolator:
             for i, test in enumerate(TESTS)
             if test.residual >= P1 and state['ratios'][i] >= 1.0
         }
-        mean = dict(zip((test.residual for test in TESTS), self._ref['mu'], strict=True))
+        p1, p2 = self._ref['pressure']['mean']
         if T1 in fired:
-            shift = T_RANGE * float(np.nanmean(window['t1']) - mean[T1])
+            shift = T_RANGE * float(np.nanmean(window['t1']) - self._mean_t1)
             if shift > 0.0:
                 return [Hypothesis(7, min(max((shift - 200.0) / 100.0, 0.0), 1.0), 0.0)]
         if P2 in fired and P1 not in fired:
-            return [Hypothesis(17, 1.0 - float(np.mean(window['p2'])) / mean[P2], 0.0)]
+            return [Hypothesis(17, 1.0 - float(np.mean(window['p2'])) / p2, 0.0)]
         if P1 in fired:
-            return [Hypothesis(17, float(np.mean(window['p1'])) / mean[P1] - 1.0, 0.0)]
+            return [Hypothesis(17, float(np.mean(window['p1'])) / p1 - 1.0, 0.0)]
         return []
 
     def _errors(

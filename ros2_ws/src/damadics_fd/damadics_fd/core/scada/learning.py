@@ -47,6 +47,7 @@ class Prediction:
     xd: Floats
     f: Floats
     sq: Floats
+    innovation: Floats
     masked: NDArray[np.bool_]
 
 
@@ -64,7 +65,9 @@ def _predict_record(
         models[i, 1] = s.xd
         models[i, 2] = s.f
         models[i, 3] = s.sq
-        models[i, 4] = 1.0 if s.masked else 0.0
+        models[i, 4] = s.innovation[0]
+        models[i, 5] = s.innovation[1]
+        models[i, 6] = 1.0 if s.masked else 0.0
 
 
 @jit
@@ -151,7 +154,8 @@ def learn(samples: Floats, settings: ScadaSettings) -> NDArray:
     r2 = _flow_residual(ref, prediction, samples[window, 6])
     slow = _slow_flow_sigma(ref, settings, prediction, samples[window])
     wandering = not all(_stationary(v) for v in samples[window, 3:6].T if not np.isnan(v).all())
-    _limits(ref, settings, r1, r2, slow, samples[window], wandering)
+    values = (r1, r2, *prediction.innovation.T, samples[window, 5])
+    _limits(ref, settings, values, slow, wandering)
     _friction_limit(ref, settings, r1, prediction, wandering)
     return reference
 
@@ -162,11 +166,11 @@ def _predict(
     trial = reference.copy()
     trial['hold'] = hold
     phi = np.empty((len(samples), N_WEIGHTS))
-    models = np.empty((len(samples), 5))
+    models = np.empty((len(samples), 7))
     _predict_record(np.zeros(1, MONITOR), settings.record(), trial, samples, phi, models)
     phi, models = phi[window], models[window]
     xm, xd, f, sq = models[:, :4].T
-    return Prediction(phi, xm, xd, f, sq, models[:, 4] > 0)
+    return Prediction(phi, xm, xd, f, sq, models[:, 4:6], models[:, 6] > 0)
 
 
 def _bias(phi: Floats, error: Floats, used: int) -> tuple[Floats, Floats]:
@@ -217,13 +221,11 @@ def _slow_flow_sigma(
 
 
 def _limits(
-    ref: Any, settings: ScadaSettings, r1: Floats, r2: Floats, slow: float, samples: Floats,
-    wandering: bool,
-) -> None:  # fmt: skip
+    ref: Any, settings: ScadaSettings, values: tuple[Floats, ...], slow: float, wandering: bool
+) -> None:
     """Set mu, sigma, allowance and limit of every CUSUM from the budget."""
-    n = len(r1)
+    n = len(values[R1])
     arl = arl_per_test(settings)
-    values = (r1, r2, samples[:, 3], samples[:, 4], samples[:, 5])
     for i, test in enumerate(TESTS):
         r = values[test.residual]
         r = r[~np.isnan(r)]

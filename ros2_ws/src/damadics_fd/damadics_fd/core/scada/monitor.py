@@ -136,7 +136,7 @@ def _replay(
     for i in range(samples.shape[0]):
         r = samples[i]
         predict(s, settings[0], reference[0], r[0], r[1], r[2], r[3], r[4], r[5], r[6])
-        residuals(s, reference[0], r[2], r[3], r[4], r[5], r[6])
+        residuals(s, reference[0], r[2], r[5], r[6])
         s.t_raw = r[0]
 
 

@@ -1,6 +1,6 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Pressure filter: a learned linear predictor, fused with the noisy measurement."""
+"""Learned linear predictors of a pressure: one to filter it by, one to test it against."""
 
 from typing import Any
 
@@ -21,6 +21,9 @@ PRESSURE = np.dtype(
             ('a', np.float64, (TAPS,)),  # predictor, sum a_i = 1
             ('c', np.float64),  # weight of the measurement
             ('sigma', np.float64),  # of the prediction error
+            ('mean', np.float64),
+            ('b', np.float64, (TAPS,)),  # predictor of the deviation from the mean
+            ('b0', np.float64),
         ],
     )
 )
@@ -32,6 +35,19 @@ def predict_pressure(filt: Any, past: np.ndarray) -> Any:
     total = 0.0
     for i in range(TAPS):
         total += filt.a[i] * past[i]
+    return total
+
+
+@jit
+def innovation(filt: Any, past: np.ndarray, measured: float) -> Any:
+    """
+    Return P'(k) less its prediction about the learned mean.
+
+    A wave that the mean does not know is predicted away, a shift of the mean stays.
+    """
+    total = measured - filt.mean - filt.b0
+    for i in range(TAPS):
+        total -= filt.b[i] * (past[i] - filt.mean)
     return total
 
 
@@ -54,7 +70,7 @@ def push(past: np.ndarray, value: float) -> None:
 
 def learn_pressure(pressure: NDArray[np.float64], sigma: float, filt: NDArray) -> None:
     """
-    Fit the predictor by ridge least squares and the fusion weight from its error.
+    Fit both predictors by ridge least squares, the fusion weight from the first one's error.
 
     :param pressure: fault-free pressure, share of full scale, shape (n,).
     :param sigma: standard deviation of the sensor noise, share of full scale.
@@ -76,3 +92,10 @@ def learn_pressure(pressure: NDArray[np.float64], sigma: float, filt: NDArray) -
     filt['a'] = a
     filt['c'] = variance / (variance + sigma**2)
     filt['sigma'] = error.std()
+    mean = pressure.mean()
+    design = np.column_stack([lagged - mean, np.ones(target.size)])
+    ridge = 0.05 * target.size * sigma**2 * np.diag([*np.ones(taps), 0.0])
+    weights = np.linalg.solve(design.T @ design + ridge, design.T @ (pressure[taps:] - mean))
+    filt['mean'] = mean
+    filt['b'][0, :taps] = weights[:taps]
+    filt['b0'] = weights[taps]

@@ -60,6 +60,8 @@ MONITOR = np.dtype(
             ('filled', np.int64),  # pressure samples since the last restart
             ('past', np.float64, (2, TAPS)),
             ('p_hat', np.float64, (2,)),
+            ('steady', np.int64),  # samples in a row at the period
+            ('innovation', np.float64, (2,)),  # of P1, P2; NaN until as many as taps are steady
             ('stem', STEM, (2,)),  # nominal, wide play
             ('fault', FAULTS, (2,)),
             ('cv', np.float64, (4,)),

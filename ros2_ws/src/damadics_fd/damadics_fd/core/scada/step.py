@@ -11,7 +11,13 @@ from damadics_fd.core.jit import jit
 from damadics_fd.core.scada.actuator import nominal_flow
 from damadics_fd.core.scada.cusum import FRICTION_TEST, P1, P2, R1, R2, T1, TESTS
 from damadics_fd.core.scada.model import advance_stem, copy_stem, start_stem
-from damadics_fd.core.scada.pressure import TAPS, fuse_pressure, predict_pressure, push
+from damadics_fd.core.scada.pressure import (
+    TAPS,
+    fuse_pressure,
+    innovation,
+    predict_pressure,
+    push,
+)
 from damadics_fd.core.scada.state import HISTORY_LENGTH, N_TESTS, N_WEIGHTS
 
 LLR_CLIP = 8.0
@@ -25,6 +31,7 @@ def restart(s: Any, cfg: Any, t: float, cv: float, p1: float, p2: float) -> None
     copy_stem(s.stem[0], s.stem[1])
     s.fault[1].f4 = cfg.wide_play - cfg.act.play
     s.filled = 0
+    s.steady = 0
     for i in range(4):
         s.cv[i] = cv
     s.dp[0] = p1 - p2
@@ -69,6 +76,11 @@ def predict(
     else:
         s.p_hat[0] = p1
         s.p_hat[1] = p2
+    s.steady = s.steady + 1 if t - t0 < 1.5 * cfg.period_s else 1
+    s.innovation[:] = math.nan
+    if s.steady > TAPS:
+        s.innovation[0] = innovation(ref.pressure[0], s.past[0], p1)
+        s.innovation[1] = innovation(ref.pressure[1], s.past[1], p2)
     push(s.past[0], p1)
     push(s.past[1], p2)
     z2 = s.dp[1]
@@ -165,10 +177,8 @@ def predict_flow(
 
 
 @jit
-def residuals(
-    s: Any, ref: Any, x: float, p1: float, p2: float, t1: float, flow: float
-) -> None:
-    """Form r1 = X' - model, r2 = (F' - valve equation) / sigma and the inputs' values."""
+def residuals(s: Any, ref: Any, x: float, t1: float, flow: float) -> None:
+    """Form r1 = X' - model, r2 = (F' - valve equation) / sigma and what the inputs show."""
     correction = 0.0
     for i in range(N_WEIGHTS):
         correction += ref.w[i] * s.phi[i]
@@ -176,8 +186,8 @@ def residuals(
     s.residual[R2] = (flow - ref.g0 - ref.g1 * s.f) / s.sq  # NaN where not measured
     if s.masked and not math.isnan(s.f):
         s.residual[R2] = 0.0
-    s.residual[P1] = p1
-    s.residual[P2] = p2
+    s.residual[P1] = s.innovation[0]
+    s.residual[P2] = s.innovation[1]
     s.residual[T1] = t1
     entry = s.history[(s.samples - 1) % HISTORY_LENGTH]
     entry.correction = correction
@@ -261,5 +271,5 @@ def step(
 ) -> None:  # fmt: skip
     """Take one accepted sample, scaled to 0..1, through prediction, residuals and tests."""
     predict(s, cfg, ref, t, cv, x, p1, p2, t1, flow)
-    residuals(s, ref, x, p1, p2, t1, flow)
+    residuals(s, ref, x, t1, flow)
     decide(s, ref)
