@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Mode scada behind the contract of estimator, detector and pipeline."""
 
+import dataclasses
 import json
 import math
 
@@ -64,6 +65,23 @@ def test_bad_samples_are_refused_with_a_reason(columns):
         assert estimator.monitor._state.tobytes() == before
     bare = [row[0] + 10**9, *row[1:5], math.nan, math.nan, math.nan]
     assert estimator.update(*bare) is not None  # flow, temperature, chamber pressure may lack
+
+
+class Held:
+    """A control value that a controller sets every twenty seconds."""
+
+    def at(self, t):
+        return 0.5 + 0.25 * np.sin(2 * np.pi * 0.0021 * (t // 20 * 20))
+
+
+def test_what_was_learned_under_a_held_cv_survives_a_restart():
+    scenario = dataclasses.replace(plant.load_scenario('nominal'), duration=1000.0, cv=Held())
+    run_ = plant.simulate(scenario, rate=1.0, noise='cv', seed=4)
+    estimator = run({name: np.asarray(run_[name]) for name in NAMES}, SETTINGS).estimator
+    assert estimator.monitor.reference['hold'].all()
+    fresh = estimator_for(SETTINGS)
+    fresh.restore(json.loads(json.dumps(estimator.learned())))
+    assert np.array_equal(fresh.monitor.reference, estimator.monitor.reference)
 
 
 def test_what_was_learned_survives_a_restart(columns, result):

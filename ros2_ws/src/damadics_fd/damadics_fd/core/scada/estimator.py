@@ -14,6 +14,7 @@ from damadics_fd.core.estimator import Estimator
 from damadics_fd.core.modes import PHASE_HOLD, PHASE_INIT, PHASE_LEARN_PHI, PHASE_MONITOR
 from damadics_fd.core.scada.actuator import Actuator
 from damadics_fd.core.scada.monitor import ScadaMonitor
+from damadics_fd.core.scada.pressure import PRESSURE
 from damadics_fd.core.scada.settings import ScadaSettings
 from damadics_fd.core.scada.state import REFERENCE
 from damadics_fd.core.settings import Settings
@@ -171,4 +172,4 @@ class ScadaEstimator(Estimator):
 
 
 _PLAIN = tuple(name for name in REFERENCE.names or () if name != 'pressure')
-_FILTER = ('a', 'c', 'sigma')
+_FILTER = tuple(PRESSURE.names or ())

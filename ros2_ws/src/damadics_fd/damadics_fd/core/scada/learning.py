@@ -31,6 +31,7 @@ MINIMUM_TRAVEL = 0.5
 # Standard errors of the learned mean by which the allowance grows, by length of block.
 STANDARD_ERRORS = {1: 0.0, 5: 4.0, 10: 4.0, 30: 5.0}
 SLOW = 30  # block of the tests that sum up hundreds of samples
+NEVER = 9.0  # a change of CV, which is 0..1, is never as large
 JUMPS = (0.05, 3.0)  # a jump of CV is more than this, and than this times the largest learned
 
 
@@ -148,7 +149,7 @@ def learn(samples: Floats, settings: ScadaSettings) -> NDArray:
     ref['hold'] = hold > 0
     smallest, factor = JUMPS
     largest = float(np.abs(np.diff(samples[window, 1])).max())
-    ref['cv_jump'] = math.inf if hold else max(smallest, factor * largest)
+    ref['cv_jump'] = NEVER if hold else max(smallest, factor * largest)
     prediction = candidates[hold]
     ref['w'][:used], r1 = _bias(prediction.phi, x - prediction.xm, used)
     r2 = _flow_residual(ref, prediction, samples[window, 6])
