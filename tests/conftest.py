@@ -27,7 +27,7 @@ class Peer:
         self.executor = EventsExecutor(context=self.context)
         self.executor.add_node(self.node)
         if publishes:
-            self.publisher = self.node.create_publisher(Measurement, 'measurement', qos.samples())
+            self.publisher = self.node.create_publisher(Measurement, 'measurement', qos.SAMPLES)
         self.got: dict[str, list] = {}
 
     def listen(self, kind, topic: str, profile: QoSProfile) -> list:

@@ -33,7 +33,7 @@ def chain(processes, peer):
         processes.start('damadics_fd', name, parameters(mode='paper'))
     for kind, topic in ((Estimate, 'estimate'), (Float64Stamped, 'residual'),
                         (Float64Stamped, 'threshold')):
-        peer.listen(kind, topic, qos.samples())
+        peer.listen(kind, topic, qos.SAMPLES)
     peer.listen(FaultFlag, 'fault_flag', qos.FLAG)
     peer.listen(DiagnosticArray, '/diagnostics', qos.DIAGNOSTICS)
     graph = peer.node
@@ -97,6 +97,35 @@ def test_bad_samples_do_not_reach_the_filters_and_are_counted(chain):
               ('not finite', 'out of range', 'duplicate', 'out of order')}
     assert counts == {'not finite': '2', 'out of range': '1', 'duplicate': '1',
                       'out of order': '1'}
+
+
+@pytest.mark.parametrize(('signal', 'value', 'ne107'), [  # IN-1, IN-2
+    ('x1', float('nan'), 'failure'), ('cv', 55.0, 'out of specification')])
+def test_lasting_bad_input_is_told_as_a_failed_sensor(chain, signal, value, ne107):
+    columns = moving_stem(400)
+    chain.send_columns(columns)
+    good = {'cv': columns['cv'][-1].item(), 'x1': columns['x1'][-1].item()}
+
+    def told() -> list[tuple[int, str, str]]:
+        return [(s.level[0], s.message, {v.key: v.value for v in s.values}['NE 107'])
+                for m in chain.got['/diagnostics'] for s in m.status if 'estimator' in s.name]
+
+    stamp = int(columns['stamp'][-1])
+    for _ in range(1640):  # 4.1 s
+        stamp += PERIOD
+        chain.send(stamp, **{**good, signal: value})
+    assert chain.wait(lambda: told() and told()[-1][0] == 2, 5.0), told()[-3:]
+    assert f'{signal} = {value:g}' in told()[-1][1]
+    assert 'check' in told()[-1][1]
+    assert told()[-1][2] == ne107
+    assert chain.wait(lambda: chain.got['fault_flag'][-1].state
+                      == FaultFlag.STATE_NOT_MONITORING, 3.0)
+    assert chain.got['fault_flag'][-1].level != FaultFlag.NE107_NORMAL
+    assert not chain.got['fault_flag'][-1].fault
+    before = len(chain.got['estimate'])
+    chain.send(stamp + PERIOD, **good)
+    assert chain.wait(lambda: len(chain.got['estimate']) == before + 1), 'no recovery'
+    assert chain.wait(lambda: told()[-1][0] < 2, 5.0)
 
 
 def test_a_late_subscriber_gets_the_last_flag_at_once(chain):

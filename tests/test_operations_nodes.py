@@ -196,7 +196,7 @@ def test_a_killed_estimator_stops_the_monitoring_within_half_a_second(valve, pla
 
 def test_a_second_publisher_on_measurement_is_reported(valve):
     assert valve.run_until(lambda: valve.report('estimator').level == b'\x00')
-    second = valve.peer.node.create_publisher(Measurement, 'measurement', qos.samples())
+    second = valve.peer.node.create_publisher(Measurement, 'measurement', qos.SAMPLES)
     assert valve.run_until(lambda: valve.says('estimator', '2 publishers on /measurement'))
     assert valve.report('estimator').level == b'\x01'
     valve.peer.node.destroy_publisher(second)

@@ -229,7 +229,7 @@ class Watcher:
             valve.lost += event.total_count_change
 
         self._subscriptions[name, topic] = self._node.create_subscription(
-            FAST[topic], _topic(name, topic), valve.batches[topic].take, qos.samples(), raw=True,
+            FAST[topic], _topic(name, topic), valve.batches[topic].take, qos.SAMPLES, raw=True,
             event_callbacks=SubscriptionEventCallbacks(message_lost=lost),
         )
 

@@ -44,9 +44,8 @@ class DetectorNode(MonitoringNode):
         self._phase = PHASE_INIT
         self._number = Float64Stamped()
         self._flag = FaultFlag()
-        samples = qos.samples(self.settings.sample_rate)
-        self._residual = self.create_publisher(Float64Stamped, 'residual', samples)
-        self._threshold = self.create_publisher(Float64Stamped, 'threshold', samples)
+        self._residual = self.create_publisher(Float64Stamped, 'residual', qos.SAMPLES)
+        self._threshold = self.create_publisher(Float64Stamped, 'threshold', qos.SAMPLES)
         self._fault_flag = self.create_publisher(FaultFlag, 'fault_flag', qos.FLAG)
         self._fault_event = self.create_publisher(FaultEvent, 'fault_event', qos.EVENTS)
         self._rival = RivalWatch(self, self.refuse)
@@ -59,7 +58,7 @@ class DetectorNode(MonitoringNode):
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(min(self.watch.timeout / 5.0, HEARTBEAT), self._look, clock=steady)
         self.create_timer(HEARTBEAT, self._publish_flag, clock=steady)
-        self.watch.subscribe(EstimateMessage, self._take, samples)
+        self.watch.subscribe(EstimateMessage, self._take, qos.SAMPLES)
         self._publish_flag()
         self.get_logger().info(f'mode {self.settings.mode}, {self.settings.sample_rate:g} Hz')
 
@@ -163,6 +162,7 @@ class DetectorNode(MonitoringNode):
             write_flag(self._decision, self._flag)
         if self.watch.silent or not self.active:
             self._flag.state = FaultFlag.STATE_NOT_MONITORING
+            self._flag.level = self._flag.level or FaultFlag.NE107_FUNCTION_CHECK
         self._fault_flag.publish(self._flag)
         self._rival.sent()
 

@@ -2,7 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Node `estimator`: velocity and on-line approximator of one actuator."""
 
+import math
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +14,7 @@ from damadics_msgs.srv import Reference as ReferenceService
 from damadics_msgs.srv import Relearn
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 
+from damadics_fd.core.alarm import NE107
 from damadics_fd.core.quality import EXPLANATIONS
 from damadics_fd.core.scada.estimator import estimator_for
 from damadics_fd.reference import Reference, ReferenceFileError, load_reference, save_reference
@@ -25,6 +28,7 @@ from damadics_fd.ros.spin import spin
 START_PLANT = 'start a driver of the valve, or the simulator: ros2 run damadics_plant plant'
 READY = (1, 0.5, 0.5, 0.0, 0.0, 20.0, 0.0, 0.0)  # a sample that makes the core compile
 MONITORING = ('monitor', 'paper')  # phases in which decisions count
+RECENT = 1.5  # s of wall time for which a refused sample is told
 
 
 class EstimatorNode(MonitoringNode):
@@ -36,13 +40,12 @@ class EstimatorNode(MonitoringNode):
         self._core = estimator_for(self.settings)
         self._message = EstimateMessage()
         self._last = self._core.phase
-        self._refused_before = 0
-        samples = qos.samples(self.settings.sample_rate)
-        self._publisher = self.create_publisher(EstimateMessage, 'estimate', samples)
+        self._refused_at = -math.inf  # monotonic time of the last refused sample [s]
+        self._publisher = self.create_publisher(EstimateMessage, 'estimate', qos.SAMPLES)
         self.create_service(Relearn, 'relearn', self._relearn)
         self.create_service(ReferenceService, 'save_reference', self._save_service)
         self.create_service(ReferenceService, 'load_reference', self._load_service)
-        self.watch.subscribe(Measurement, self._take, samples)
+        self.watch.subscribe(Measurement, self._take, qos.SAMPLES)
         self.start()
         self.get_logger().info(f'mode {self.settings.mode}, {self.settings.sample_rate:g} Hz')
 
@@ -65,6 +68,7 @@ class EstimatorNode(MonitoringNode):
             return
         estimate = self._core.update(*sample(measurement))
         if estimate is None:
+            self._refused_at = time.monotonic()
             self.diagnostics.check()
             return
         write_estimate(estimate, self._message)
@@ -127,8 +131,10 @@ class EstimatorNode(MonitoringNode):
     def report(self) -> Report:
         """Say what the estimator does, and what it refused."""
         counters = self._core.counters
-        refused = sum(counters[reason] for reason in EXPLANATIONS)
+        good = self._core.phase in MONITORING
+        failed = self._core.failed_input
         values = {
+            'NE 107': self._class_of(failed, good),
             'Phase': self._core.phase,
             'Learning progress (%)': 100.0 * self._message.progress,
             'Last refused': self._core.last_rejection or 'none',
@@ -136,12 +142,17 @@ class EstimatorNode(MonitoringNode):
         }
         if self.watch.silent:
             return Level.ERROR, 'no measurement arrives', values
-        if refused > self._refused_before:
-            self._refused_before = refused
+        if failed:
+            return Level.ERROR, f'not monitored, the input has failed: {failed}', values
+        if time.monotonic() - self._refused_at < RECENT:
             reason = self._core.last_rejection.split(':')[0]
-            return Level.WARN, f'samples refused: {EXPLANATIONS.get(reason, reason)}', values
-        good = self._core.phase in MONITORING
+            return Level.WARN, f'samples refused: {EXPLANATIONS[reason]}', values
         return Level.OK if good else Level.WARN, self._core.status, values
+
+    def _class_of(self, failed: str, good: bool) -> str:
+        if failed:
+            return NE107[2 if failed.startswith('out_of_range') else 4]
+        return NE107[0 if good else 3]
 
 
 def main(args: list[str] | None = None) -> int:

@@ -43,15 +43,14 @@ class Player(Node):
         super().__init__('replay')
         self._rate = rate
         self._clock = self.create_publisher(Clock, '/clock', 10)
-        samples = qos.samples(400.0 * rate)
-        self._measurement = self.create_publisher(Measurement, 'measurement', samples)
-        self._state = self.create_publisher(FaultState, 'fault_state', samples)
+        self._measurement = self.create_publisher(Measurement, 'measurement', qos.SAMPLES)
+        self._state = self.create_publisher(FaultState, 'fault_state', qos.SAMPLES)
         self._judges = None
         if settings:
             self._judges = estimator_for(settings), Detector(settings)
-            self._estimate = self.create_publisher(EstimateMessage, 'estimate', samples)
-            self._residual = self.create_publisher(Float64Stamped, 'residual', samples)
-            self._threshold = self.create_publisher(Float64Stamped, 'threshold', samples)
+            self._estimate = self.create_publisher(EstimateMessage, 'estimate', qos.SAMPLES)
+            self._residual = self.create_publisher(Float64Stamped, 'residual', qos.SAMPLES)
+            self._threshold = self.create_publisher(Float64Stamped, 'threshold', qos.SAMPLES)
             self._flag = self.create_publisher(FaultFlag, 'fault_flag', qos.FLAG)
             self._event = self.create_publisher(FaultEvent, 'fault_event', qos.EVENTS)
         self._begin: tuple[int, float] | None = None  # stamp [ns] and wall time [s] of the start

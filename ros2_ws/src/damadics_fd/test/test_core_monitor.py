@@ -162,6 +162,32 @@ def test_fault_during_learning_is_refused(change):
         result.estimator.learned()
 
 
+def test_fault_seen_in_half_a_second_of_learning_is_refused():  # AL-1
+    def motion(t):  # rests from 48 s to 59.4 s
+        return 0.2 + 0.12 * np.abs((np.where((t > 48) & (t < 59.4), 48, t) % 10.0) - 5.0)
+
+    result = run(valve(120.0, noise=1.4e-3, motion=motion,
+                       friction=lambda t: 0.011 * (1 + 3 * (t > 50))), SETTINGS)
+    assert not np.any(result.estimates['phase'] == PHASE_MONITOR)
+    assert 'learning was refused' in result.estimator.status
+
+
+def test_motion_in_one_direction_is_not_enough():
+    def motion(t):  # both ways until 36 s, then closing only
+        return np.where(t < 36.0, 0.2 + 0.12 * np.abs((t % 10.0) - 5.0), 0.32 + 0.012 * (t - 36))
+
+    columns = valve(80.0, noise=1.4e-3, motion=motion)
+    result = run(columns, SETTINGS)
+    assert not np.any(result.estimates['phase'] == PHASE_MONITOR)
+    assert 'insufficient excitation' in result.estimator.status
+    assert 'in one direction only' in result.estimator.status
+    later = run(valve(60.0, noise=1.4e-3, first=80.0,
+                      motion=lambda t: 0.848 - 0.06 * (10.0 - np.abs((t % 20.0) - 10.0))),
+                SETTINGS, result.estimator, result.detector)
+    assert later.estimates['phase'][-1] == PHASE_MONITOR
+    assert later.detections == []
+
+
 def test_disturbance_during_learning_only_delays_it():
     passing = valve(200.0, friction=lambda t: 0.011 * (1 + 4 * ((t > 40) & (t < 48))))
     result = run(passing, SETTINGS)

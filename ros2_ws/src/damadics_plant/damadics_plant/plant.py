@@ -62,9 +62,8 @@ class Plant(Node):
                                         duration=duration or None)
         except ValueError as problem:
             parameters.check(f'scenario: {problem}')
-        profile = qos.samples(rate * max(self._factor, 1.0))
-        self._measurement = self.create_publisher(Measurement, 'measurement', profile)
-        self._fault_state = self.create_publisher(FaultState, 'fault_state', profile)
+        self._measurement = self.create_publisher(Measurement, 'measurement', qos.SAMPLES)
+        self._fault_state = self.create_publisher(FaultState, 'fault_state', qos.SAMPLES)
         self.create_service(InjectFault, 'inject_fault', self._inject)
         self._clock_topic = None
         if publish_clock:

@@ -177,14 +177,7 @@ def update(q: NDArray, s: NDArray, c: NDArray, e: NDArray, stamp: int, cv: float
     :param s: estimator state.
     :param c: settings.
     :param e: estimate.
-    :param stamp: stamp [ns].
-    :param cv: control value [1].
-    :param x1: stem position [1].
-    :param p1: pressure before the valve [Pa].
-    :param p2: pressure behind the valve [Pa].
-    :param t1: temperature of the medium [degC].
-    :param flow: flow [kg/s].
-    :param ps: chamber pressure, gauge [Pa].
+    :param stamp: the rest is the sample as in `step`.
     :return: quality.ACCEPTED or the reason of refusal.
     """
     return step(q[0], s[0], c[0], e[0], stamp, cv, x1, p1, p2, t1, flow, ps)

@@ -23,6 +23,7 @@ from damadics_fd.core.modes import PHASE_HOLD, PHASE_MONITOR, PHASE_PAPER, PHASE
 from damadics_fd.core.settings import Settings
 
 STILL = 600.0  # s without motion after which the status says so
+FAILED = 4.0  # s of refused samples after which the input counts as failed
 
 
 class Estimator:
@@ -92,6 +93,19 @@ class Estimator:
         return counts
 
     @property
+    def failed_input(self) -> str:
+        """
+        Say what is wrong with the input where nothing else has come for `FAILED` seconds.
+
+        :return: signal, value, how long in nominal sample periods, remedy; '' where all is well.
+        """
+        lasting = int(self.quality[0].refused_in_a_row) / self.settings.sample_rate
+        if lasting < FAILED:
+            return ''
+        remedy = quality.REMEDIES[self.last_rejection.split(':')[0]]
+        return f'{self.last_rejection}, for {lasting:.0f} s: {remedy}'
+
+    @property
     def phase(self) -> str:
         """
         Return the phase of the last estimate.
@@ -124,8 +138,11 @@ class Estimator:
                     f'changed meanwhile ({self._change()}); inspect it, then learn anew')
         late = (s.elapsed - s.start) * 1e-9 >= c.t_learn
         if late:
-            return (f'{share}: insufficient excitation, {float(s.travel):.2f} of '
-                    f'{c.travel_min:.2f} strokes travelled; move the valve both ways')
+            if s.travel < c.travel_min:
+                return (f'{share}: insufficient excitation, {float(s.travel):.2f} of '
+                        f'{c.travel_min:.2f} strokes travelled; move the valve both ways')
+            return (f'{share}: insufficient excitation, the stem moved too little of late or in '
+                    'one direction only; move the valve both ways over its stroke')
         return share
 
     @property

@@ -5,6 +5,7 @@
 from typing import Any
 
 from damadics_fd.core import approximator, honn, settled
+from damadics_fd.core.force import plug_coefficient
 from damadics_fd.core.jit import jit
 from damadics_fd.core.modes import (
     PAPER,
@@ -15,16 +16,21 @@ from damadics_fd.core.modes import (
     PHASE_MONITOR,
     PHASE_PAPER,
 )
+from damadics_fd.core.threshold import threshold
 
 STATE = [('elapsed', 'i8'),  # ns since the first sample, gaps that restart the filters left out
          ('start', 'i8'),  # elapsed time at which learning began
          ('held_until', 'i8'),  # elapsed time at which the filters have settled after a restart
          ('armed', '?'), ('phase', 'i8'), ('trend', 'f8'), ('noise', 'f8'),
-         ('rest', 'f8'), ('rested', 'i8'), *settled.STATE]
+         ('rest', 'f8'), ('rested', 'i8'),
+         ('exceeded', 'i8'),  # elapsed time at which an alarm would last have been near
+         *settled.STATE]
 
 TREND = 0.1  # s; slower parts of the disturbance are no noise
 MEDIAN = 2.0  # s in which the median of the noise may grow e times
-LEAST_NOISE = 1e-3  # 1/s2
+QUIET = 8.0  # part of the learning of Phi that has to end without a would-be alarm
+UNPROVEN = 1.05  # growth of Phi that needs no proof
+LEAST_NOISE = 1.0  # 1/s2; far below what moves the lowest threshold
 
 
 @jit
@@ -39,7 +45,7 @@ def forget(s: Any, c: Any) -> None:
     s.armed = False
     s.travel = 0.0
     s.noise = LEAST_NOISE
-    s.compared = 0
+    s.proven = 0.0
     s.block[:] = 0.0
     s.block_end = 0
     s.drift = 0.0
@@ -90,9 +96,9 @@ def phase_of(s: Any, c: Any) -> int:
         return PHASE_LEARN_ALPHA
     if guarded(c) and not settle(s, c):
         return PHASE_LEARN_ALPHA
-    if t < c.t_learn or s.travel < c.travel_min or (guarded(c) and s.compared == 0):
+    if t < c.t_learn or s.travel < c.travel_min or (guarded(c) and not excited(s, c)):
         return PHASE_LEARN_PHI
-    cover_noise(s, c)
+    s.b1 += max(0.0, least_bound(s, c) - honn.bound(s, 0.0))
     arm(s)
     return PHASE_MONITOR
 
@@ -145,7 +151,7 @@ def progress_of(s: Any, c: Any) -> float:
     wait = c.t_w / c.t_learn if c.t_learn > 0.0 else 0.0
     done = min(1.0, (s.elapsed - s.start) * 1e-9 / c.t_learn) if c.t_learn > 0.0 else 1.0
     moved = min(1.0, s.travel / c.travel_min) if c.travel_min > 0.0 else 1.0
-    return min(done, wait + (1.0 - wait) * moved)
+    return min(done, wait + (1.0 - wait) * moved, 0.99)
 
 
 @jit
@@ -153,7 +159,8 @@ def watch_noise(s: Any, c: Any, dt: float) -> None:
     """
     Follow the median of the fast part of the disturbance (k2 + alpha1) xi2 + Phi sigm(xi2).
 
-    The median, because it does not see the reversals of the friction.
+    The median, because it does not see the reversals of the friction; times the plug coefficient
+    of the place, because the noise is mostly that of the pressures in the plug force.
 
     :param s: state record after `approximator.observe`: noise [1/s2] in and out.
     :param c: settings record.
@@ -162,21 +169,60 @@ def watch_noise(s: Any, c: Any, dt: float) -> None:
     d = (c.k2 + s.ah1) * s.xi2 + abs(s.phi) * min(max(s.xi2 / c.delta, -1.0), 1.0)
     s.trend += min(dt / TREND, 1.0) * (d - s.trend)
     grow = 1.0 + min(dt / MEDIAN, 1.0)
-    s.noise = s.noise * grow if abs(d - s.trend) > s.noise else max(s.noise / grow, LEAST_NOISE)
+    fast = abs(d - s.trend) * plug_coefficient(c, s.x1 - c.preload)
+    s.noise = s.noise * grow if fast > s.noise else max(s.noise / grow, LEAST_NOISE)
 
 
 @jit
-def cover_noise(s: Any, c: Any) -> None:
+def largest_noise(s: Any, c: Any) -> float:
     """
-    Raise the bound b1 where Phi would not keep the noise of the sensors below the threshold.
+    Return the standard deviation of the noise where it is largest, near the closed stop.
+
+    :param s: state record.
+    :param c: settings record.
+    :return: of the disturbance [1/s2].
+    """
+    return float(1.4826 * s.noise / plug_coefficient(c, 1.0 - c.gate_high))
+
+
+@jit
+def least_bound(s: Any, c: Any) -> float:
+    """
+    Return the bound that keeps the noise of the sensors below the threshold.
 
     Friction that is small beside the noise would leave a Phi that noise passes now and then.
 
-    :param s: state record: b1 out.
+    :param s: state record.
     :param c: settings record.
+    :return: least Phi [1/s2].
     """
-    least = c.noise_factor * 1.4826 * s.noise / (1.0 + c.kappa)
-    s.b1 += max(0.0, least - honn.bound(s, 0.0))
+    return float(c.noise_factor * largest_noise(s, c) / (1.0 + c.kappa))
+
+
+@jit
+def excited(s: Any, c: Any) -> bool:
+    """
+    Tell whether the stem has moved in such a way that what was learned holds from now on.
+
+    Phi has not grown since the valve was last seen to be the same, so that no fault was learned
+    unseen; and what the force balance foresees anywhere in the stroke, in both directions, stays
+    below what raises an alarm: motion in one direction lets alpha5 take friction for stiffness.
+    Nothing has raised one for a while either.
+
+    :param s: state record: exceeded in and out.
+    :param c: settings record.
+    :return: False where more motion is needed.
+    """
+    learned = honn.bound(s, 0.0)
+    if s.proven == 0.0 or learned > UNPROVEN * s.proven:
+        return False
+    phi = max(learned, least_bound(s, c))
+    alarm = phi + (c.k2 + s.ah1) * threshold(c, phi, s.ah1)
+    force = settled.foreseen(s, s.ah5 / c.alpha5 - 1.0, largest_noise(s, c) / c.alpha5,
+                             c.preload + c.gate_low, c.preload + 1.0 - c.gate_high)
+    if c.alpha5 * force > alarm:
+        s.exceeded = s.elapsed
+    return bool((s.elapsed - s.exceeded) * 1e-9 >= (c.t_learn - c.t_w) / QUIET)
 
 
 @jit
@@ -232,6 +278,8 @@ def follow(s: Any, c: Any, phase: int, dt: float) -> None:
         return
     s.travel += step
     watch_noise(s, c, dt)
+    if abs(s.xi2) >= threshold(c, s.phi, s.ah1):
+        s.exceeded = s.elapsed
     if s.elapsed - s.moved < settled.FRESH:
         left = s.u - s.x1 - c.alpha1 / c.alpha5 * s.x2
         settled.collect(s, dt / settled.CORRELATION, s.x1, left)

@@ -20,6 +20,13 @@ EXPLANATIONS = {
     'duplicate': 'header.stamp equals that of the sample before',
     'out_of_order': 'header.stamp is before that of the sample before',
 }
+REMEDIES = {
+    'not_finite': 'check its transmitter and wiring; what the mode does not need may be NaN',
+    'out_of_range': 'check transmitter, unit (fractions, Pa) and the range in the settings',
+    'zero_stamp': 'let the driver stamp its samples',
+    'duplicate': 'let one driver only send, each sample once',
+    'out_of_order': 'let one driver only send, in order of time',
+}
 SIGNALS = ('cv', 'x1', 'p1', 'p2', 't1', 'flow', 'ps')
 
 DTYPE = np.dtype((np.record, np.dtype([

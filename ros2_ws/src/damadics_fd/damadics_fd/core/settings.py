@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damadics_fd.core.modes import MODES
+from damadics_fd.core.setting import choice, number, problem_of, switch, wrong_choice
 
 VELOCITIES = ('high_pass', 'kalman', 'super_twisting')
 THRESHOLDS = ('paper', 'floor')
-CHOICES = {'mode': MODES, 'velocity': VELOCITIES, 'threshold': THRESHOLDS}
 
 
 class SettingsError(ValueError):
@@ -34,23 +34,6 @@ SCADA = {
     'sample_rate': 1.0, 'rho_min': 1.0, 'decide_m': 1, 'decide_n': 1, 't_on': 300.0, 't_w': 60.0,
     't_learn': 900.0, 'gate_low': 0.0, 'gate_high': 0.0, 'gap_reset': 30.0, 'hold': 120.0,
 }
-
-
-def _number(unit: str, text: str, low: float, high: float, paper: Any, monitor: Any) -> Any:
-    meta = {'unit': unit, 'description': text, 'low': low, 'high': high,
-            'default': {'paper': paper, 'monitor': monitor}}
-    return field(default=monitor, metadata=meta)
-
-
-def _choice(text: str, options: tuple[str, ...], paper: str, monitor: str) -> Any:
-    meta = {'unit': '', 'description': text, 'choices': options,
-            'default': {'paper': paper, 'monitor': monitor}}
-    return field(default=monitor, metadata=meta)
-
-
-def _switch(text: str, paper: bool, monitor: bool) -> Any:
-    meta = {'unit': '', 'description': text, 'default': {'paper': paper, 'monitor': monitor}}
-    return field(default=monitor, metadata=meta)
 
 
 # K_m of the plug-force law at 0, 10, .., 90, 99, 100 % of the stroke (DABLib 1.22)
@@ -75,138 +58,139 @@ class Settings:
     damadics_fd.core.settings.SettingsError: k1 = -1.0 1/s is outside 0.001..1e+06; ...
     """
 
-    mode: str = _choice('paper: the printed method; monitor: learn, freeze, detect; '
-                        "scada: a control room's signals at 1 Hz", MODES,
-                        'paper', 'monitor')
-    sample_rate: float = _number('Hz', 'nominal sample rate of the measurement', 0.01, 1e5,
-                                 400.0, 200.0)
+    mode: str = choice('paper: the printed method; monitor: learn, freeze, detect; '
+                       "scada: a control room's signals at 1 Hz", MODES,
+                       'paper', 'monitor')
+    sample_rate: float = number('Hz', 'nominal sample rate of the measurement', 0.01, 1e5,
+                                400.0, 200.0)
 
     # velocity estimator
-    velocity: str = _choice('velocity estimator', VELOCITIES, 'high_pass', 'kalman')
-    tau: float = _number('s', 'time constant of the high-pass velocity filter', 1e-4, 10.0,
-                         0.14, 0.02)
-    wn: float = _number('rad/s', 'bandwidth of the steady-state Kalman filter', 0.1, 1e4,
-                        50.0, 50.0)
-    lipschitz: float = _number('1/s2', 'bound on the acceleration / stroke for the super-twisting '
-                               'differentiator', 1e-3, 1e6, 20.0, 20.0)
-    consistent: bool = _switch('filter position and input with the filter of the velocity', False,
-                               True)
+    velocity: str = choice('velocity estimator', VELOCITIES, 'high_pass', 'kalman')
+    tau: float = number('s', 'time constant of the high-pass velocity filter', 1e-4, 10.0,
+                        0.14, 0.02)
+    wn: float = number('rad/s', 'bandwidth of the steady-state Kalman filter', 0.1, 1e4,
+                       50.0, 50.0)
+    lipschitz: float = number('1/s2', 'bound on the acceleration / stroke for the super-twisting '
+                              'differentiator', 1e-3, 1e6, 20.0, 20.0)
+    consistent: bool = switch('filter position and input with the filter of the velocity', False,
+                              True)
 
     # observer and adaptive laws, equations (10)-(15)
-    k1: float = _number('1/s', 'observer gain on the position error', 1e-3, 1e6, 100.0, 100.0)
-    k2: float = _number('1/s', 'observer gain on the velocity error', 1e-3, 1e6, 400.0, 400.0)
-    coupling: float = _number('', 'weight p of xi1 in the Lyapunov function; the term '
-                              'alpha5/p xi2 in (10) is left out where p is 0', 0.0, 1e9, 1.0, 0.0)
-    alpha1: float = _number('1/s', 'initial alpha1, viscous friction / mass', 0.0, 1e7, 0.0, 750.0)
-    alpha4: float = _number('1/s2', 'initial alpha4, input gain', 0.0, 1e9, 0.04, 30446.0)
-    alpha5: float = _number('1/s2', 'initial alpha5, stiffness / mass', 0.0, 1e9, 0.04, 30446.0)
-    g1: float = _number('', 'adaptation gain of alpha1', 0.0, 1e9, 0.0, 0.0)
-    g4: float = _number('', 'adaptation gain of alpha4', 0.0, 1e9, 0.0, 0.0)
-    g5: float = _number('', 'adaptation gain of alpha5', 0.0, 1e9, 0.0, 1000.0)
-    gw: float = _number('', 'adaptation gain of the weights and bounds in Phi', 0.0, 1e9,
-                        100.0, 500.0)
-    delta: float = _number('1/s', 'half width of the boundary layer of the robust term', 1e-9,
-                           1e3, 0.05, 0.03)
-    dz: float = _number('1/s', 'dead-zone: Phi learns only where |xi2| is larger', 0.0, 1e3,
-                        0.0, 0.06)
-    band: float = _number('', 'alphas stay within this share of their initial values', 0.0, 1.0,
-                          0.3, 0.3)
-    w_max: float = _number('', 'bound on the norm of the weights in Phi', 1e-9, 1e12, 1e5, 1e5)
+    k1: float = number('1/s', 'observer gain on the position error', 1e-3, 1e6, 100.0, 100.0)
+    k2: float = number('1/s', 'observer gain on the velocity error', 1e-3, 1e6, 400.0, 400.0)
+    coupling: float = number('', 'weight p of xi1 in the Lyapunov function; the term '
+                             'alpha5/p xi2 in (10) is left out where p is 0', 0.0, 1e9, 1.0, 0.0)
+    alpha1: float = number('1/s', 'initial alpha1, viscous friction / mass', 0.0, 1e7, 0.0, 750.0)
+    alpha4: float = number('1/s2', 'initial alpha4, input gain', 0.0, 1e9, 0.04, 30446.0)
+    alpha5: float = number('1/s2', 'initial alpha5, stiffness / mass', 0.0, 1e9, 0.04, 30446.0)
+    g1: float = number('', 'adaptation gain of alpha1', 0.0, 1e9, 0.0, 0.0)
+    g4: float = number('', 'adaptation gain of alpha4', 0.0, 1e9, 0.0, 0.0)
+    g5: float = number('', 'adaptation gain of alpha5', 0.0, 1e9, 0.0, 1000.0)
+    gw: float = number('', 'adaptation gain of the weights and bounds in Phi', 0.0, 1e9,
+                       100.0, 500.0)
+    delta: float = number('1/s', 'half width of the boundary layer of the robust term', 1e-9,
+                          1e3, 0.05, 0.03)
+    dz: float = number('1/s', 'dead-zone: Phi learns only where |xi2| is larger', 0.0, 1e3,
+                       0.0, 0.06)
+    band: float = number('', 'alphas stay within this share of their initial values', 0.0, 1.0,
+                         0.3, 0.3)
+    w_max: float = number('', 'bound on the norm of the weights in Phi', 1e-9, 1e12, 1e5, 1e5)
 
     # threshold (16) and decision
-    threshold: str = _choice('paper: rho = |Phi|/k2; floor: kappa |Phi|/(k2 + alpha1)',
-                             THRESHOLDS, 'paper', 'floor')
-    kappa: float = _number('', 'factor of the threshold "floor"', 0.01, 1e3, 1.0, 1.5)
-    rho_min: float = _number('1/s', 'lowest threshold', 0.0, 1e3, 0.0, 0.2)
-    decide_m: int = _number('', 'samples over the threshold that make a decision ...', 1, 64, 2, 2)
-    decide_n: int = _number('', '... out of this number of latest samples', 1, 64, 2, 2)
-    on_delay: float = _number('s', 'time a decision lasts before it raises the alarm', 0.0, 3600.0,
-                              0.0, 0.0)
-    off_delay: float = _number('s', 'time without decision before the condition counts as gone',
-                               0.0, 86400.0, 0.0, 5.0)
-    latch: bool = _switch('keep the alarm until it is reset', False, True)
-    level_maintenance: float = _number('', 'residual/threshold of "maintenance required"', 1.0,
-                                       1e6, 1.0, 1.0)
-    level_specification: float = _number('', 'residual/threshold of "out of specification"', 1.0,
-                                         1e6, 1.5, 1.5)
-    level_failure: float = _number('', 'residual/threshold of "failure"', 1.0, 1e6, 2.5, 2.5)
-    chatter: int = _number('1/min', 'alarms per minute that count as chatter', 2, 16, 3, 3)
+    threshold: str = choice('paper: rho = |Phi|/k2; floor: kappa |Phi|/(k2 + alpha1)',
+                            THRESHOLDS, 'paper', 'floor')
+    kappa: float = number('', 'factor of the threshold "floor"', 0.01, 1e3, 1.0, 1.5)
+    rho_min: float = number('1/s', 'lowest threshold', 0.0, 1e3, 0.0, 0.2)
+    decide_m: int = number('', 'samples over the threshold that make a decision ...', 1, 64, 2, 2)
+    decide_n: int = number('', '... out of this number of latest samples', 1, 64, 2, 2)
+    on_delay: float = number('s', 'time a decision lasts before it raises the alarm', 0.0, 3600.0,
+                             0.0, 0.0)
+    off_delay: float = number('s', 'time without decision before the condition counts as gone',
+                              0.0, 86400.0, 0.0, 5.0)
+    latch: bool = switch('keep the alarm until it is reset', False, True)
+    level_maintenance: float = number('', 'residual/threshold of "maintenance required"', 1.0,
+                                      1e6, 1.0, 1.0)
+    level_specification: float = number('', 'residual/threshold of "out of specification"', 1.0,
+                                        1e6, 1.5, 1.5)
+    level_failure: float = number('', 'residual/threshold of "failure"', 1.0, 1e6, 2.5, 2.5)
+    chatter: int = number('1/min', 'alarms per minute that count as chatter', 2, 16, 3, 3)
 
     # learning
-    t_on: float = _number('s', 'time for the filters to settle before learning', 0.0, 1e6,
-                          0.0, 5.0)
-    t_w: float = _number('s', 'start of the learning of Phi', 0.0, 1e6, 0.0, 20.0)
-    t_learn: float = _number('s', 'earliest end of learning', 0.0, 1e7, 0.0, 60.0)
-    travel_min: float = _number('', 'stem travel / stroke that learning needs', 0.0, 1e6, 0.0, 0.5)
-    noise_factor: float = _number('', 'standard deviations of the noise that Phi and threshold '
-                                  'together keep off at least', 0.0, 100.0, 8.0, 8.0)
-    play: float = _number('', 'motion within a play of this half width is no travel', 0.0, 0.5,
-                          0.005, 0.005)
-    settled_stiffness: float = _number('', 'change of the stiffness while learning that is '
-                                       'tolerated', 1e-6, 1.0, 0.004, 0.004)
-    settled_friction: float = _number('', 'change of the friction / (K L) while learning that is '
-                                      'tolerated', 1e-6, 1.0, 0.0018, 0.0018)
-    settled_max: float = _number('', 'squared distance, in standard deviations, from the valve at '
-                                 'the start of learning that makes it start again', 1.0, 1e12,
-                                 60.0, 60.0)
-    gate_low: float = _number('', 'stem closer to the open stop: a push from the stop is ignored',
-                              0.0, 0.5, 0.0, 0.01)
-    gate_high: float = _number('', 'stem closer to the closed stop: nothing is decided or learned',
-                               0.0, 0.5, 0.0, 0.03)
+    t_on: float = number('s', 'time for the filters to settle before learning', 0.0, 1e6,
+                         0.0, 5.0)
+    t_w: float = number('s', 'start of the learning of Phi', 0.0, 1e6, 0.0, 20.0)
+    t_learn: float = number('s', 'earliest end of learning', 0.0, 1e7, 0.0, 60.0)
+    travel_min: float = number('', 'stem travel / stroke that learning needs', 0.0, 1e6, 0.0, 0.5)
+    noise_factor: float = number('', 'standard deviations of the noise, where it is largest, that '
+                                 'Phi and threshold together keep off at least', 0.0, 100.0,
+                                 5.0, 5.0)
+    play: float = number('', 'motion within a play of this half width is no travel', 0.0, 0.5,
+                         0.005, 0.005)
+    settled_stiffness: float = number('', 'change of the stiffness while learning that is '
+                                      'tolerated', 1e-6, 1.0, 0.004, 0.004)
+    settled_friction: float = number('', 'change of the friction / (K L) while learning that is '
+                                     'tolerated', 1e-6, 1.0, 0.0018, 0.0018)
+    settled_max: float = number('', 'squared distance, in standard deviations, from the valve as '
+                                'it was learned before that makes learning start again', 1.0,
+                                1e12, 30.0, 30.0)
+    gate_low: float = number('', 'stem closer to the open stop: a push from the stop is ignored',
+                             0.0, 0.5, 0.0, 0.01)
+    gate_high: float = number('', 'stem closer to the closed stop: nothing is decided or learned',
+                              0.0, 0.5, 0.0, 0.03)
 
     # the actuator, for the force input u = m g + Ae Ps - Fvc(X, P1, P2)
-    mass: float = _number('kg', 'moving mass', 1e-3, 1e5, 2.0, 2.0)
-    stiffness: float = _number('N/m', 'spring and diaphragm constant K', 1.0, 1e9,
-                               60892.0, 60892.0)
-    stroke: float = _number('m', 'travel of the stem', 1e-4, 10.0, 0.0381, 0.0381)
-    preload: float = _number('', 'initial compression of the spring / stroke', 0.0, 10.0,
-                             0.0, 0.25)
-    area: float = _number('m2', 'effective area of the diaphragm', 1e-6, 10.0, 0.029, 0.029)
-    plug_diameter: float = _number('m', 'plug diameter', 0.0, 2.0, 0.05, 0.05)
-    gravity: float = _number('m/s2', 'gravity along the stem', -10.0, 10.0, 9.81, 9.81)
+    mass: float = number('kg', 'moving mass', 1e-3, 1e5, 2.0, 2.0)
+    stiffness: float = number('N/m', 'spring and diaphragm constant K', 1.0, 1e9,
+                              60892.0, 60892.0)
+    stroke: float = number('m', 'travel of the stem', 1e-4, 10.0, 0.0381, 0.0381)
+    preload: float = number('', 'initial compression of the spring / stroke', 0.0, 10.0,
+                            0.0, 0.25)
+    area: float = number('m2', 'effective area of the diaphragm', 1e-6, 10.0, 0.029, 0.029)
+    plug_diameter: float = number('m', 'plug diameter', 0.0, 2.0, 0.05, 0.05)
+    gravity: float = number('m/s2', 'gravity along the stem', -10.0, 10.0, 9.81, 9.81)
     plug_table: tuple[float, ...] = field(default=PLUG_TABLE, metadata={
         'unit': '', 'description': 'K_m of the plug force at 0, 10, .., 90, 99, 100 % of stroke',
         'low': 0.01, 'high': 10.0, 'default': {'paper': PLUG_TABLE, 'monitor': PLUG_TABLE}})
 
     # the valve signature
-    signature: bool = _switch('tell friction, spring and sensors apart; needs ps', False, True)
-    own_alarm: bool = _switch('alarm on changes that the approximator cannot see', False, True)
-    verify: float = _number('s', 'time to check the force model after learning; half an hour on '
-                            'a real valve', 0.0, 1e6, 60.0, 60.0)
-    plug_gain_std: float = _number('', 'how well the plug force is known: standard deviation of '
-                                   'its gain', 1e-9, 1.0, 0.03, 0.03)
-    plug_shape_std: float = _number('', 'and of each entry of its table', 1e-9, 1.0, 0.01, 0.01)
-    material_friction: float = _number('', 'change of friction that asks for maintenance', 0.0,
-                                       100.0, 0.3, 0.3)
-    material_spring: float = _number('', 'change of stiffness that asks for maintenance', 0.0,
-                                     1.0, 0.02, 0.02)
-    material_supply: float = _number('', "loss of the chamber's top filling rate that alarms",
-                                     0.01, 0.9, 0.1, 0.1)
-    supply_pressure: float = _number('Pa', 'supply pressure of the positioner, gauge', 1e4, 5e6,
-                                     600e3, 600e3)
-    chamber_volume: float = _number('m3', 'dead volume of the servomotor', 0.0, 10.0, 5.5e-3,
-                                    5.5e-3)
+    signature: bool = switch('tell friction, spring and sensors apart; needs ps', False, True)
+    own_alarm: bool = switch('alarm on changes that the approximator cannot see', False, True)
+    verify: float = number('s', 'time to check the force model after learning; half an hour on '
+                           'a real valve', 0.0, 1e6, 60.0, 60.0)
+    plug_gain_std: float = number('', 'how well the plug force is known: standard deviation of '
+                                  'its gain', 1e-9, 1.0, 0.03, 0.03)
+    plug_shape_std: float = number('', 'and of each entry of its table', 1e-9, 1.0, 0.01, 0.01)
+    material_friction: float = number('', 'change of friction that asks for maintenance', 0.0,
+                                      100.0, 0.3, 0.3)
+    material_spring: float = number('', 'change of stiffness that asks for maintenance', 0.0,
+                                    1.0, 0.02, 0.02)
+    material_supply: float = number('', "loss of the chamber's top filling rate that alarms",
+                                    0.01, 0.9, 0.1, 0.1)
+    supply_pressure: float = number('Pa', 'supply pressure of the positioner, gauge', 1e4, 5e6,
+                                    600e3, 600e3)
+    chamber_volume: float = number('m3', 'dead volume of the servomotor', 0.0, 10.0, 5.5e-3,
+                                   5.5e-3)
 
     # SCADA-rate monitor
-    false_alarm_days: float = _number('d', 'mode scada: days per false alarm', 0.01, 1e5,
-                                      30.0, 30.0)
-    sensor_noise: float = _number('', 'mode scada: standard deviation of the sensors / full scale',
-                                  1e-6, 0.1, 1.414e-3, 1.414e-3)
+    false_alarm_days: float = number('d', 'mode scada: days per false alarm', 0.01, 1e5,
+                                     30.0, 30.0)
+    sensor_noise: float = number('', 'mode scada: standard deviation of the sensors / full scale',
+                                 1e-6, 0.1, 1.414e-3, 1.414e-3)
 
     # input check
-    signal_low: float = _number('', 'cv and x1 below it are refused (NAMUR NE 43: 3.6 mA)', -1.0,
-                                0.0, -0.025, -0.025)
-    signal_high: float = _number('', 'cv and x1 above it are refused (NAMUR NE 43: 21 mA)', 1.0,
-                                 2.0, 1.0625, 1.0625)
-    p_max: float = _number('Pa', 'p1 and p2 above it are refused', 1e3, 1e9, 4.25e6, 4.25e6)
-    ps_max: float = _number('Pa', 'ps above it is refused', 1e3, 1e8, 1e6, 1e6)
-    gap_reset: float = _number('s', 'a longer gap restarts the filters; what is learned stays',
-                               1e-3, 1e6, 2.0, 2.0)
-    hold: float = _number('s', 'no decision for this time after such a restart', 0.0, 1e4,
-                          0.0, 1.0)
-    clock_jump: float = _number('s', 'stamps further back than this may be a clock that was set '
-                                'back', 1e-3, 1e9, 1.0, 1.0)
-    clock_jump_samples: int = _number('', 'samples in order that confirm it', 2, 10000, 10, 10)
+    signal_low: float = number('', 'cv and x1 below it are refused (NAMUR NE 43: 3.6 mA)', -1.0,
+                               0.0, -0.025, -0.025)
+    signal_high: float = number('', 'cv and x1 above it are refused (NAMUR NE 43: 21 mA)', 1.0,
+                                2.0, 1.0625, 1.0625)
+    p_max: float = number('Pa', 'p1 and p2 above it are refused', 1e3, 1e9, 4.25e6, 4.25e6)
+    ps_max: float = number('Pa', 'ps above it is refused', 1e3, 1e8, 1e6, 1e6)
+    gap_reset: float = number('s', 'a longer gap restarts the filters; what is learned stays',
+                              1e-3, 1e6, 2.0, 2.0)
+    hold: float = number('s', 'no decision for this time after such a restart', 0.0, 1e4,
+                         0.0, 1.0)
+    clock_jump: float = number('s', 'stamps further back than this may be a clock that was set '
+                               'back', 1e-3, 1e9, 1.0, 1.0)
+    clock_jump_samples: int = number('', 'samples in order that confirm it', 2, 10000, 10, 10)
 
     def __post_init__(self) -> None:
         """Refuse wrong values."""
@@ -243,7 +227,7 @@ class Settings:
         problems = [f'{name}: no such setting' for name in values if name not in known]
         mode = values.get('mode', 'monitor')
         if mode not in MODES:
-            raise SettingsError([*problems, _wrong_choice('mode', mode, MODES)])
+            raise SettingsError([*problems, wrong_choice('mode', mode, MODES)])
         merged = {name: _default(item, mode) for name, item in known.items()}
         merged.update({name: value for name, value in values.items() if name in known})
         try:
@@ -269,7 +253,7 @@ class Settings:
 
         :return: one sentence per error; empty where all is well.
         """
-        texts = (_problem(item, getattr(self, item.name)) for item in fields(self))
+        texts = (problem_of(item, getattr(self, item.name)) for item in fields(self))
         return list(filter(None, texts)) or _contradictions(self)
 
     def to_dict(self) -> dict[str, Any]:
@@ -324,38 +308,6 @@ def _dtype() -> np.dtype:
 def _default(item: Field, mode: str) -> Any:
     defaults = item.metadata['default']
     return SCADA.get(item.name, defaults['monitor']) if mode == 'scada' else defaults[mode]
-
-
-def _wrong_choice(name: str, value: Any, options: tuple[str, ...]) -> str:
-    return f'{name} = {value!r} is not one of {", ".join(options)}'
-
-
-def _problem(item: Field, value: Any) -> str:
-    name, meta = item.name, item.metadata
-    if 'choices' in meta:
-        return '' if value in meta['choices'] else _wrong_choice(name, value, meta['choices'])
-    if item.type is bool:
-        return '' if isinstance(value, bool) else f'{name} = {value!r} is not true or false'
-    if item.name == 'plug_table':
-        return _plug_table_problem(value, meta['low'], meta['high'])
-    number = int if item.type is int else (int, float)
-    if isinstance(value, bool) or not isinstance(value, number):
-        kind = 'a whole number' if item.type is int else 'a number'
-        return f'{name} = {value!r} is not {kind}'
-    if not meta['low'] <= value <= meta['high']:  # also catches NaN
-        unit = f' {meta["unit"]}' if meta['unit'] else ''
-        return f'{name} = {value!r}{unit} is outside {meta["low"]:g}..{meta["high"]:g}'
-    return ''
-
-
-def _plug_table_problem(value: Any, low: float, high: float) -> str:
-    try:
-        table = [float(v) for v in value]
-    except (TypeError, ValueError):
-        return f'plug_table = {value!r} is not a list of numbers'
-    if len(table) != len(PLUG_TABLE) or not all(low <= v <= high for v in table):
-        return f'plug_table needs {len(PLUG_TABLE)} numbers in {low:g}..{high:g}'
-    return ''
 
 
 def _contradictions(s: Settings) -> list[str]:

@@ -5,9 +5,10 @@ Guard against learning a fault: see that the valve stays the same while it is le
 
 The force balance of the moving stem, u - x1 - (alpha1/alpha5) x2 = offset + dK x1 + friction s
 with s the direction of motion, is fitted to blocks of the learning time by least squares with
-a weak prior. A block that differs from the first by more than the fits' own uncertainty and
-a tolerance means that stiffness or friction change; so does a force that leaves the first fit
-by more than the friction itself. What was learned is then thrown away.
+a weak prior. A block that differs from those before it by more than the fits' own uncertainty
+and a tolerance means that stiffness or friction change; so does a force that leaves their fit
+by more than the friction itself. What was learned is then thrown away. The fit of all blocks
+also tells what the approximator will meet where the stem has not been or not gone that way.
 """
 
 import math
@@ -15,21 +16,23 @@ from typing import Any
 
 import numpy as np
 
+from damadics_fd.core import honn
 from damadics_fd.core.jit import jit
 
 N = 3  # offset, relative change of the stiffness, friction / (K L)
 SUMS = 11  # weight, upper triangle of S, q, square of the left side
 STATE = [('place', 'f8'), ('direction', 'f8'), ('moved', 'i8'), ('travel', 'f8'),
          ('block', 'f8', (SUMS,)), ('base', 'f8', (SUMS,)), ('block_end', 'i8'),
-         ('compared', 'i8'), ('unsettled', 'i8'), ('distance', 'f8'), ('change', 'f8', (N,)),
+         ('proven', 'f8'), ('unsettled', 'i8'), ('distance', 'f8'), ('change', 'f8', (N,)),
          ('theta', 'f8', (N,)), ('cov', 'f8', (N, N)), ('sigma', 'f8'), ('drift', 'f8')]
 
 CORRELATION = 0.1  # s; samples closer than this count as one
 FRESH = 200_000_000  # ns after its last motion in which the stem counts as moving
 PRIOR = (0.05, 0.05, 0.02)  # standard deviations of offset, dK/K, friction
 SIGMA_MIN = 1e-3  # of K L: model error of the moving stem
-QUICK = 0.5  # s; mean over which a force that leaves the first fit is judged
+QUICK = 0.5  # s; mean over which a force that leaves the fit is judged
 ENOUGH = 8.0  # weight that makes a block comparable, in correlation times
+CONFIDENCE = 3.5  # standard deviations
 
 
 @jit
@@ -131,7 +134,7 @@ def invert(a: Any) -> None:
 @jit
 def compare(s: Any, c: Any) -> None:
     """
-    Set the distance of the block from the first one, and the change of the parameters.
+    Set the distance of the block from those before it, and the change of the parameters.
 
     :param s: state record: distance, change out.
     :param c: settings record: what change of offset, stiffness and friction is tolerated.
@@ -155,29 +158,67 @@ def compare(s: Any, c: Any) -> None:
 @jit
 def close_block(s: Any, c: Any) -> bool:
     """
-    End a block: keep it as the first one or compare it.
+    End a block: compare it with those before it and add it to them.
 
-    :param s: state record.
+    :param s: state record: proven out, the bound that was learned on a valve that stayed the same.
     :param c: settings record.
     :return: False where the valve has changed.
     """
     same = True
     if s.block[0] >= ENOUGH:
-        if s.base[0] == 0.0:
-            s.base[:] = s.block
-            s.sigma = fit(s.base, s.theta, s.cov)
-        else:
+        if s.base[0] > 0.0:
             compare(s, c)
-            s.compared += 1
             same = s.distance <= c.settled_max
+            s.proven = honn.bound(s, 0.0)
+        if same:
+            s.base[:] += s.block
+            s.sigma = fit(s.base, s.theta, s.cov)
     s.block[:] = 0.0
     return same
 
 
 @jit
+def foreseen(s: Any, stiffness: float, noise: float, low: float, high: float) -> float:
+    """
+    Return the force the approximator will have to explain in the worst place of the stroke.
+
+    The force balance leaves most at an end of the stroke, in one of the directions. To it come
+    CONFIDENCE standard deviations of the noise or of the fit itself, whichever is larger.
+
+    :param s: state record with the fit of all blocks.
+    :param stiffness: the relative change of it that alpha5 has learned.
+    :param noise: standard deviation of the force / (K L).
+    :param low: position at the lower end, with preload [1].
+    :param high: position at the upper end, with preload [1].
+    :return: force / (K L).
+    """
+    most = 0.0
+    for x1 in (low, high):
+        for d in (-1.0, 1.0):
+            left = abs(s.theta[0] + (s.theta[1] - stiffness) * x1 + s.theta[2] * d)
+            sigma = math.sqrt(max(spread(s, x1, d), 0.0))
+            most = max(most, left + CONFIDENCE * max(noise, sigma))
+    return most
+
+
+@jit
+def spread(s: Any, x1: float, d: float) -> float:
+    """
+    Return the variance of the force that the fit predicts.
+
+    :param s: state record with the fit of all blocks.
+    :param x1: position [1].
+    :param d: direction of motion, -1 or 1.
+    :return: variance [1].
+    """
+    return float(s.cov[0, 0] + s.cov[1, 1] * x1 * x1 + s.cov[2, 2]
+                 + 2.0 * (s.cov[0, 1] * x1 + s.cov[0, 2] * d + s.cov[1, 2] * x1 * d))
+
+
+@jit
 def strays(s: Any, c: Any, dt: float, x1: float, left: float) -> bool:
     """
-    Tell whether the force has left the first fit by more than friction and noise explain.
+    Tell whether the force has left the fit by more than friction and noise explain.
 
     :param s: state record: drift in and out.
     :param c: settings record.
@@ -191,9 +232,8 @@ def strays(s: Any, c: Any, dt: float, x1: float, left: float) -> bool:
     d = s.direction
     error = left - s.theta[0] - s.theta[1] * x1 - s.theta[2] * d
     s.drift += min(dt / QUICK, 1.0) * (error - s.drift)
-    spread = (s.cov[0, 0] + s.cov[1, 1] * x1 * x1 + s.cov[2, 2]
-              + 2.0 * (s.cov[0, 1] * x1 + s.cov[0, 2] * d + s.cov[1, 2] * x1 * d))
-    noise = 5.0 * s.sigma * math.sqrt(CORRELATION / QUICK) + 4.0 * math.sqrt(max(spread, 0.0))
+    noise = (5.0 * s.sigma * math.sqrt(CORRELATION / QUICK)
+             + 4.0 * math.sqrt(max(spread(s, x1, d), 0.0)))
     friction = max(s.theta[2], math.sqrt(s.cov[2, 2]), c.settled_friction)
     if abs(s.drift) <= 1.5 * friction + noise:
         return False

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the monitoring nodes share: a lifecycle that starts by itself, parameters, diagnostics."""
 
+from abc import ABC, abstractmethod
+
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
 
@@ -13,7 +15,7 @@ from damadics_fd.ros.waiting import InputWatch
 TIMEOUT_LIMITS = (0.01, 3600.0)
 
 
-class MonitoringNode(LifecycleNode):
+class MonitoringNode(LifecycleNode, ABC):
     """
     A lifecycle node with one watched input.
 
@@ -46,13 +48,13 @@ class MonitoringNode(LifecycleNode):
     def declare_more(self) -> None:
         """Declare the parameters of the node itself."""
 
+    @abstractmethod
     def report(self) -> Report:
         """
         Say how the active node is.
 
         :return: level, one sentence, values by name.
         """
-        raise NotImplementedError
 
     def start(self) -> None:
         """Go through the lifecycle to active, if `autostart` says so; call it at the end."""

@@ -4,23 +4,13 @@
 
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-SECONDS_HELD = 2.0
-LEAST_DEPTH = 100_000  # samples: a process may be held up; memory is taken only when needed
-
-
-def samples(rate: float = 0.0) -> QoSProfile:
-    """
-    Return the profile of a topic that carries samples: reliable, volatile.
-
-    :param rate: samples per second of wall time; the queue holds two seconds of them.
-    :return: the profile.
-    """
-    return QoSProfile(
-        history=HistoryPolicy.KEEP_LAST,
-        depth=max(LEAST_DEPTH, int(SECONDS_HELD * rate) + 1),
-        reliability=ReliabilityPolicy.RELIABLE,
-        durability=DurabilityPolicy.VOLATILE,
-    )
+HELD = 100_000  # samples: a process may be held up; memory is taken only when needed
+SAMPLES = QoSProfile(  # of a topic that carries samples
+    history=HistoryPolicy.KEEP_LAST,
+    depth=HELD,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.VOLATILE,
+)
 
 
 def latched(depth: int) -> QoSProfile:

@@ -64,16 +64,9 @@ class ScadaEstimator(Estimator):
     def update(self, stamp: int, cv: float, x1: float, p1: float, p2: float, t1: float,
                flow: float, ps: float) -> Estimate | None:
         """
-        Take one measurement, with the fields of damadics_msgs/Measurement.
+        Take one measurement; `t1` and `flow` may be NaN, `ps` is not used.
 
-        :param stamp: sampling instant [ns].
-        :param cv: control value [1].
-        :param x1: stem position [1], 0 open, 1 closed.
-        :param p1: pressure before the valve [Pa].
-        :param p2: pressure behind the valve [Pa].
-        :param t1: temperature of the medium [degC]; NaN where not measured.
-        :param flow: flow [kg/s]; NaN where not measured.
-        :param ps: chamber pressure, gauge [Pa]; not used.
+        :param stamp: these parameters are those of `Estimator.update`.
         :return: the estimate; None where the sample was refused, see `last_rejection`.
         """
         values = (cv, x1, p1, p2, t1, flow, ps)
