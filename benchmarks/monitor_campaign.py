@@ -3,12 +3,12 @@
 """
 Measure what monitor mode achieves: false alarms, misses, delays, masking, other sample rates.
 
-    python benchmarks/monitor_campaign.py                  everything, about an hour of CPU time
+    python benchmarks/monitor_campaign.py                  everything, half an hour of CPU time
     python benchmarks/monitor_campaign.py anchors seeds    these studies only
     python benchmarks/monitor_campaign.py --runs 5         a quick look
 
-Every run takes the force from measured, noisy ps, p1, p2 and x1, as at a plant. One JSON object
-per study goes to `--out`, one line of text to the screen.
+Every run but those of `exact` takes the force from measured, noisy ps, p1, p2 and x1, as at a
+plant. One JSON object per study goes to `--out`, one line of text to the screen.
 """
 
 import argparse
@@ -31,6 +31,8 @@ RATE = 200.0
 FRICTION, SPRING = 'f4', 'f11'
 # the approximator alone: the signature's own alarm is measured by its own campaign
 APPROXIMATOR = Settings.for_mode('monitor', signature=False, own_alarm=False)
+EXACT = APPROXIMATOR.replace(ps_max=1e8)  # ps carries the plug force too and may be negative
+PLACES = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.99, 1.0)  # of the plug table
 
 
 def random_valve(rng: np.random.Generator) -> LuGreActuator:
@@ -62,6 +64,22 @@ def random_run(seed: int, fault: str | None = None, strength: float = 1.0, start
                     seed=seed)
 
 
+def exact_force(columns: Mapping[str, np.ndarray], seed: int) -> Mapping[str, np.ndarray]:
+    """
+    Put the benchmark's noise on x1 alone and let the force be the plant's own.
+
+    Its noise is 1e-3 of the spring force over one stroke. The plug force goes into ps, with
+    p1 = p2, for else the noise of x1 would enter by the place at which it is computed.
+    """
+    c, rng, n = EXACT, np.random.default_rng([seed, 5]), len(columns['stamp'])
+    plug = (columns['p1'] - columns['p2']) * np.pi * c.plug_diameter**2 / 4.0 / np.interp(
+        columns['x1'], PLACES, c.plug_table)
+    force = 1e-3 * c.stiffness * c.stroke * rng.standard_normal(n) - plug
+    hum = 2.5e-3 * np.sin(2 * np.pi * (50.0 * columns['stamp'] * 1e-9 + rng.random()))
+    return {**columns, 'x1': columns['x1'] + 1.41e-3 * rng.standard_normal(n) + hum,
+            'p1': columns['p2'], 'ps': columns['ps'] + force / c.area}
+
+
 def seconds(result: Result) -> list[float]:
     return [round(event.stamp * 1e-9, 4) for event in result.detections]
 
@@ -81,6 +99,10 @@ def summary(result: Result) -> dict[str, Any]:
 
 def one(seed: int, settings: Settings = APPROXIMATOR, **case: Any) -> dict[str, Any]:
     return summary(run(random_run(seed, **case), settings))
+
+
+def one_exact(seed: int, **case: Any) -> dict[str, Any]:
+    return summary(run(exact_force(random_run(seed, noise=False, **case), seed), EXACT))
 
 
 def many(job: Callable[[int], dict[str, Any]], seeds: range, workers: int) -> list[dict[str, Any]]:
@@ -162,6 +184,30 @@ def seeds(runs: int, workers: int) -> dict[str, Any]:
     }
 
 
+def exact(runs: int, workers: int) -> dict[str, Any]:
+    """Use the condition of the specification's own figures: noise on x1, force of the plant."""
+    paper = partial(paper_run, model='dablib', force_exact=True)
+    out = {}
+    for name, few in (('', range(runs)), (', further seeds', range(runs, 6 * runs))):
+        out[f'nominal{name}'] = quiet(many(one_exact, few, workers))
+        out[f'friction ramp +1{name}'] = delays(many(
+            partial(one_exact, fault=FRICTION, development=20.0), few, workers))
+        out[f'spring +1{name}'] = delays(many(partial(one_exact, fault=SPRING), few, workers))
+    out['DABLib, paper, nominal'] = quiet(many(paper, range(runs), workers))
+    out['DABLib, paper, f4'] = delays(many(partial(paper, fault=FRICTION, development=20.0),
+                                           range(runs), workers))
+    out['DABLib, paper, f11'] = delays(many(partial(paper, fault=SPRING), range(runs), workers))
+    return out
+
+
+def further(runs: int, workers: int) -> dict[str, Any]:
+    """Repeat friction and spring with five times as many other seeds."""
+    few = range(runs, 6 * runs)
+    return {'friction ramp +1': delays(many(partial(one, fault=FRICTION, development=20.0), few,
+                                            workers)),
+            'spring +1': delays(many(partial(one, fault=SPRING), few, workers))}
+
+
 def dablib(runs: int, workers: int) -> dict[str, Any]:
     """Use the same constants on the DABLib plant, control value of the paper and random."""
     job = partial(one, model='dablib')
@@ -175,13 +221,15 @@ def dablib(runs: int, workers: int) -> dict[str, Any]:
 
 
 def paper_run(seed: int, model: str, fault: str | None = None,
-              development: float = 0.0) -> dict[str, Any]:
+              development: float = 0.0, force_exact: bool = False) -> dict[str, Any]:
     base = simulate('paper_nominal', rate=RATE, duration=0.0).scenario
     faults = () if fault is None else (Fault(fault, 1.0, 70.0, development),)
     scenario = Scenario('paper', 120.0, cv=base.cv, p1=base.p1, p2=base.p2, t1=base.t1,
                         faults=faults)
-    return summary(run(simulate(scenario, rate=RATE, model=model, noise=True, seed=seed),
-                       APPROXIMATOR))
+    columns = simulate(scenario, rate=RATE, model=model, noise=not force_exact, seed=seed)
+    if force_exact:
+        columns = exact_force(columns, seed)
+    return summary(run(columns, EXACT if force_exact else APPROXIMATOR))
 
 
 def fault_free(runs: int, workers: int) -> dict[str, Any]:
@@ -304,8 +352,8 @@ def slow(runs: int, workers: int) -> dict[str, Any]:
             'weights': float(norm), 'largest_xi2': float(np.abs(good['xi2']).max())}
 
 
-STUDIES = {function.__name__: function
-           for function in (anchors, seeds, dablib, fault_free, day, masking, rates, slow)}
+STUDIES = {function.__name__: function for function in (
+    anchors, exact, seeds, further, dablib, fault_free, day, masking, rates, slow)}
 
 
 def main() -> None:

@@ -130,9 +130,9 @@ class Settings:
                                       'tolerated', 1e-6, 1.0, 0.004, 0.004)
     settled_friction: float = number('', 'change of the friction / (K L) while learning that is '
                                      'tolerated', 1e-6, 1.0, 0.0018, 0.0018)
-    settled_max: float = number('', 'squared distance, in standard deviations, from the valve as '
-                                'it was learned before that makes learning start again', 1.0,
-                                1e12, 30.0, 30.0)
+    settled_max: float = number('', 'squared distance, in standard deviations, from the valve at '
+                                'the start of learning that makes it start again', 1.0, 1e12,
+                                60.0, 60.0)
     gate_low: float = number('', 'stem closer to the open stop: a push from the stop is ignored',
                              0.0, 0.5, 0.0, 0.01)
     gate_high: float = number('', 'stem closer to the closed stop: nothing is decided or learned',

@@ -5,10 +5,11 @@ Guard against learning a fault: see that the valve stays the same while it is le
 
 The force balance of the moving stem, u - x1 - (alpha1/alpha5) x2 = offset + dK x1 + friction s
 with s the direction of motion, is fitted to blocks of the learning time by least squares with
-a weak prior. A block that differs from those before it by more than the fits' own uncertainty
-and a tolerance means that stiffness or friction change; so does a force that leaves their fit
-by more than the friction itself. What was learned is then thrown away. The fit of all blocks
-also tells what the approximator will meet where the stem has not been or not gone that way.
+a weak prior. A block that differs from the first by more than the fits' own uncertainty and
+a tolerance means that stiffness or friction change; so does a force that leaves the fit of all
+blocks by more than the friction itself. What was learned is then thrown away. The fit of all
+blocks also tells what the approximator will meet where the stem has not been, or not gone that
+way.
 """
 
 import math
@@ -22,9 +23,9 @@ from damadics_fd.core.jit import jit
 N = 3  # offset, relative change of the stiffness, friction / (K L)
 SUMS = 11  # weight, upper triangle of S, q, square of the left side
 STATE = [('place', 'f8'), ('direction', 'f8'), ('moved', 'i8'), ('travel', 'f8'),
-         ('block', 'f8', (SUMS,)), ('base', 'f8', (SUMS,)), ('block_end', 'i8'),
-         ('proven', 'f8'), ('unsettled', 'i8'), ('distance', 'f8'), ('change', 'f8', (N,)),
-         ('theta', 'f8', (N,)), ('cov', 'f8', (N, N)), ('sigma', 'f8'), ('drift', 'f8')]
+         ('block', 'f8', (SUMS,)), ('base', 'f8', (SUMS,)), ('pool', 'f8', (SUMS,)),
+         ('block_end', 'i8'), ('proven', 'f8'), ('unsettled', 'i8'), ('distance', 'f8'),
+         ('change', 'f8', (N,)), ('theta', 'f8', (N,)), ('cov', 'f8', (N, N)), ('sigma', 'f8'), ('drift', 'f8')]
 
 CORRELATION = 0.1  # s; samples closer than this count as one
 FRESH = 200_000_000  # ns after its last motion in which the stem counts as moving
@@ -134,7 +135,7 @@ def invert(a: Any) -> None:
 @jit
 def compare(s: Any, c: Any) -> None:
     """
-    Set the distance of the block from those before it, and the change of the parameters.
+    Set the distance of the block from the first one, and the change of the parameters.
 
     :param s: state record: distance, change out.
     :param c: settings record: what change of offset, stiffness and friction is tolerated.
@@ -158,7 +159,7 @@ def compare(s: Any, c: Any) -> None:
 @jit
 def close_block(s: Any, c: Any) -> bool:
     """
-    End a block: compare it with those before it and add it to them.
+    End a block: keep it as the first one or compare it; add it to the pool of all.
 
     :param s: state record: proven out, the bound that was learned on a valve that stayed the same.
     :param c: settings record.
@@ -166,13 +167,17 @@ def close_block(s: Any, c: Any) -> bool:
     """
     same = True
     if s.block[0] >= ENOUGH:
-        if s.base[0] > 0.0:
+        if s.base[0] == 0.0:
+            s.base[:] = s.block
+            s.pool[:] = 0.0
+        else:
+            s.sigma = fit(s.base, s.theta, s.cov)
             compare(s, c)
             same = s.distance <= c.settled_max
             s.proven = honn.bound(s, 0.0)
         if same:
-            s.base[:] += s.block
-            s.sigma = fit(s.base, s.theta, s.cov)
+            s.pool[:] += s.block
+            s.sigma = fit(s.pool, s.theta, s.cov)
     s.block[:] = 0.0
     return same
 
