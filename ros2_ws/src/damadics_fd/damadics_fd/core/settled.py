@@ -25,7 +25,8 @@ SUMS = 11  # weight, upper triangle of S, q, square of the left side
 STATE = [('place', 'f8'), ('direction', 'f8'), ('moved', 'i8'), ('travel', 'f8'),
          ('block', 'f8', (SUMS,)), ('base', 'f8', (SUMS,)), ('pool', 'f8', (SUMS,)),
          ('block_end', 'i8'), ('proven', 'f8'), ('unsettled', 'i8'), ('distance', 'f8'),
-         ('change', 'f8', (N,)), ('theta', 'f8', (N,)), ('cov', 'f8', (N, N)), ('sigma', 'f8'), ('drift', 'f8')]
+         ('change', 'f8', (N,)), ('theta', 'f8', (N,)), ('cov', 'f8', (N, N)), ('sigma', 'f8'),
+         ('drift', 'f8')]
 
 CORRELATION = 0.1  # s; samples closer than this count as one
 FRESH = 200_000_000  # ns after its last motion in which the stem counts as moving
