@@ -25,7 +25,7 @@ def chain(processes, peer):
     """Start estimator and detector in monitor mode and listen to the signature."""
     for name in ('estimator', 'detector'):
         processes.start('damadics_fd', name, parameters(**QUICK))
-    peer.listen(Float64Stamped, 'threshold', qos.samples())
+    peer.listen(Float64Stamped, 'threshold', qos.SAMPLES)
     peer.listen(Signature, 'signature', qos.FLAG)
     await_chain(peer)
     return peer
@@ -54,7 +54,7 @@ def send(peer, columns: dict[str, np.ndarray]) -> None:
 
 
 def test_a_fault_of_the_running_plant_gets_its_cause_and_replay_says_the_same(chain, processes):
-    measured = chain.listen(Measurement, 'measurement', qos.samples())
+    measured = chain.listen(Measurement, 'measurement', qos.SAMPLES)
     processes.start('damadics_plant', 'plant', parameters(
         scenario='random_spring', model='lugre', noise=True, rate=RATE, duration=120.0,
         real_time_factor=8.0, wait_for_subscribers=2))
