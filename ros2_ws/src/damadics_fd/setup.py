@@ -21,6 +21,7 @@ setup(
     license='Apache-2.0',
     extras_require={
         'test': ['pytest', 'hypothesis'],
+        'progpy': ['progpy'],  # test only: an independent plant
         'evaluate': ['jinja2', 'matplotlib', 'river', 'filterpy', 'scikit-learn'],
         'cluster': ['dask[distributed]'],
         'parquet': ['pyarrow'],
