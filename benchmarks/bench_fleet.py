@@ -130,7 +130,10 @@ def measure(options: argparse.Namespace, folder: Path) -> None:
         page = None
         if chromium:
             page = chromium.new_page(viewport={'width': 1440, 'height': 960})
+            page.goto(f'http://127.0.0.1:{port}')
+            page.wait_for_selector(f'[data-valve={valves[0].name}]')
             page.goto(f'http://127.0.0.1:{port}/valve/{valves[0].name}')
+            page.wait_for_selector('canvas')
         plants = [task for task in tasks if task.executable == 'plant']
         for task in plants:
             start(task)
