@@ -12,12 +12,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from bag_support import needs_messages
 from damadics_fd.bag import write_columns
 from damadics_fd.commission import main as commission
 from damadics_fd.core.pipeline import run
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.signature import SignatureView
+
+from .bag_support import needs_messages
 
 valve = pytest.importorskip(
     'progpy.models.pneumatic_valve',
