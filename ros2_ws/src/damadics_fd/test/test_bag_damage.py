@@ -136,9 +136,9 @@ def corruptions(tmp_path: Path, count: int, seed: int) -> None:
     for i in range(count):
         damaged = corrupted(data, rng)
         bad.write_bytes(damaged)
-        began = time.perf_counter()
+        began = time.process_time()
         report = inspect(bad)
-        slowest = max(slowest, time.perf_counter() - began)
+        slowest = max(slowest, time.process_time() - began)
         expected = intact(damaged, data, ends, starts)
         if report.code == WHOLE:  # unharmed, or a CRC of zero, which means "not computed"
             changed = [k for k, (a, b) in enumerate(zip(damaged, data, strict=True)) if a != b]
