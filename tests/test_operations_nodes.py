@@ -318,6 +318,8 @@ def test_the_policy_of_a_fleet_allows_all_that_its_nodes_make(processes, peer):
         name for name, _ in graph.get_service_names_and_types()}, 60.0)
     assert peer.wait(lambda: graph.count_publishers('/lv101/estimate')
                      and graph.count_subscribers('/lv101/estimate'), 30.0)
+    nodes = {(name, '/lv101') for name in ('estimator', 'detector', 'plant')}
+    assert peer.wait(lambda: nodes <= set(graph.get_node_names_and_namespaces()), 30.0)
     asks = {'publish': graph.get_publisher_names_and_types_by_node,
             'subscribe': graph.get_subscriber_names_and_types_by_node,
             'reply': graph.get_service_names_and_types_by_node}

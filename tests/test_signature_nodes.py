@@ -90,6 +90,7 @@ def restart(peer, processes, *names):
     for name in names:
         processes.start('damadics_fd', name, parameters(**QUICK))
     await_chain(peer)
+    peer.wait(lambda: False, 2.0)  # the estimator, too, has to find the new detector
 
 
 def test_a_restarted_detector_explains_a_fault_at_once(chain, processes):

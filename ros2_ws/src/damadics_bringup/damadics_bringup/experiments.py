@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from damadics_fd.bag.columns import read_columns
+from damadics_fd.core.alarm import RAISED
 from damadics_fd.core.pipeline import Result, run
 from damadics_fd.core.settings import Settings
 
@@ -80,7 +81,7 @@ def judge(experiment: Experiment, bag: Path) -> tuple[Outcome, dict[str, Any], R
     columns = dict(topics['/measurement'])
     result = run(columns, Settings.for_mode('paper'))
     counts = {topic: len(rows['stamp']) for topic, rows in topics.items()}
-    edges = rising_edges(read_columns(bag, '/fault_flag'))
+    edges = raised(read_columns(bag, '/fault_event'))
     offline = [event.stamp * 1e-9 for event in result.detections]
     truth = topics['/fault_state']
     if np.array_equal(truth['stamp'], columns['stamp']):
@@ -102,16 +103,17 @@ def judge(experiment: Experiment, bag: Path) -> tuple[Outcome, dict[str, Any], R
     return outcome, columns, result
 
 
-def rising_edges(flags: dict[str, Any]) -> list[float]:
+def raised(events: dict[str, Any]) -> list[float]:
     """
-    Find where a recorded flag rises.
+    Find when a fault was flagged.
 
-    :param flags: columns of `fault_flag`, repeated messages included.
-    :return: stamps of the rising edges [s].
+    The events, not the flag: of two changes within a millisecond, as in a run faster than the
+    real valve, `fault_flag` may bring the last one only.
+
+    :param events: columns of `fault_event`.
+    :return: stamps of the transitions to a fault [s].
     """
-    fault = flags['fault'].astype(bool)
-    rises = np.flatnonzero(fault & ~np.concatenate(([False], fault[:-1])))
-    return [int(stamp) * 1e-9 for stamp in flags['stamp'][rises]]
+    return [int(stamp) * 1e-9 for stamp in events['stamp'][events['transition'] == RAISED]]
 
 
 def first_from(onset: float, instants: list[float]) -> float | None:

@@ -12,6 +12,7 @@ import rclpy
 from builtin_interfaces.msg import Time
 from damadics_msgs.msg import Estimate as EstimateMessage
 from damadics_msgs.msg import FaultEvent, FaultFlag, FaultState, Float64Stamped, Measurement
+from rclpy.duration import Duration
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
@@ -105,6 +106,11 @@ class Player(Node):
             self._judge(stamp, signals)
             yield row
 
+    def finish(self) -> None:
+        """Let subscribers take the last sample, then go."""
+        self._measurement.wait_for_all_acked(Duration(seconds=2.0))
+        self.destroy_node()
+
     def _wait_for(self, stamp: int) -> None:
         """Wait until a sample is due, showing the time on /clock."""
         now = time.perf_counter()
@@ -177,7 +183,7 @@ def publish(
                         bar.update()
                         if not rclpy.ok():
                             return 0
-            player.destroy_node()
+            player.finish()
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     finally:
