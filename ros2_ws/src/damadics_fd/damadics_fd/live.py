@@ -29,7 +29,7 @@ from damadics_fd.ros.conversions import event_message, set_stamp, write_estimate
 
 CLOCK_PERIOD = 0.01  # [s] of wall time between two messages on /clock
 HEARTBEAT = 10**9  # [ns] of scenario time between two flags without change
-DISCOVERY = 2.0  # [s] without a new subscriber before the first sample
+DISCOVERY = 3.5  # [s] without a new subscriber before the first sample; DDS announces every 3 s
 
 
 class Player(Node):
