@@ -8,7 +8,7 @@ from damadics_fd.core import approximator, velocity
 from damadics_fd.core.estimation import STATE, start
 from damadics_fd.core.estimator import Estimator
 from damadics_fd.core.force import force_input
-from damadics_fd.core.honn import sigmoid
+from damadics_fd.core.honn import sigmoids
 from damadics_fd.core.jit import jit
 from damadics_fd.core.modes import PHASE_LEARN_PHI, PHASE_MONITOR
 from damadics_fd.core.pipeline import run
@@ -76,11 +76,17 @@ def test_explicit_euler_diverges_where_the_implicit_step_does_not():
 
 
 def test_printed_sigmoids():
-    assert sigmoid(0.0, 0.8, -4.0, 2.119, -1.5) == pytest.approx(-0.70017, abs=1e-5)
-    s2 = np.array([sigmoid(0.0, 0.8, -4.0, 2.119, -1.5)**n for n in range(1, 6)])
+    assert sigmoids(0.0)[2] == pytest.approx(-0.70017, abs=1e-5)
+    s2 = np.array([sigmoids(0.0)[2]**n for n in range(1, 6)])
     assert s2 @ s2 == pytest.approx(0.934, abs=1e-3)
+    for x in (-20.0, -0.6, -0.1, -0.0, 0.0, 1e-9, 0.2, 3.0):
+        printed = [m / (1.0 + np.exp(-slope * (z - center))) + shift
+                   for z, m, slope, center, shift in (
+                       (x, 1.41, -10.0225, 0.5974, -2.11), (abs(x), 1.41, -10.0225, 0.5974, -2.11),
+                       (abs(x), 0.8, -4.0, 2.119, -1.5))]
+        assert sigmoids(x) == pytest.approx(printed, rel=1e-14)
     for x in (-1e300, 1e300):
-        assert np.isfinite(sigmoid(x, 1.41, -10.0225, 0.5974, -2.11))
+        assert np.isfinite(sigmoids(x)).all()
 
 
 @pytest.mark.parametrize(('x', 'plug'), [(0.0, 1767.1), (1.0, 4417.9), (0.995, 1767.1 / 0.425)])

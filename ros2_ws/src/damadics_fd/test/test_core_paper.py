@@ -111,3 +111,12 @@ def test_plain_python_gives_the_same_numbers():
             env={'PYTHONPATH': ':'.join(sys.path), 'NUMBA_DISABLE_JIT': disable})
         outputs.append([float(v) for v in done.stdout.split()])
     assert outputs[0] == pytest.approx(outputs[1], rel=1e-9)
+
+
+def test_the_printed_observer_stays_stable_when_phi_has_drifted():
+    settings, columns = Settings.for_mode('paper'), recording(4000, rate=200.0)
+    estimator = Estimator(settings)
+    estimator.state['b1'] = 500.0  # Phi/delta is 10 000 1/s: 25 per step of 2.5 ms
+    result = run(columns, settings, estimator)
+    assert np.nanmax(np.abs(result.estimates['xi2'])) < 0.1
+    assert np.nanmax(np.abs(result.estimates['xi1'])) < 0.1

@@ -9,6 +9,8 @@ from damadics_fd.core.jit import jit
 
 STATE = [('xh1', 'f8'), ('xh2', 'f8'), ('xi1', 'f8'), ('xi2', 'f8'), ('phi', 'f8'),
          ('ah1', 'f8'), ('ah4', 'f8'), ('ah5', 'f8'), *honn.STATE]
+STIFFEST = 2.5  # largest rate times step; Runge and Kutta's method is unstable from 2.78 on
+SHORTEST = 1e-9  # s
 
 
 @jit
@@ -54,7 +56,7 @@ def observe(s: Any, c: Any, dt: float, x1: float, x2: float, u: float) -> None:
     :param x2: velocity [1/s].
     :param u: input [1].
     """
-    honn.regress(s, x2)
+    honn.regress(s, honn.sigmoids(x2))
     s.phi = honn.bound(s, x2)
     P = abs(s.phi)
     den = 1.0 + dt * (s.ah1 + c.k2)
@@ -75,6 +77,31 @@ def observe(s: Any, c: Any, dt: float, x1: float, x2: float, u: float) -> None:
 
 
 @jit
+def slopes(s: Any, c: Any, pull: float, gain: float, phi: float, xh1: float, xh2: float,
+           x1: float, x2: float, u: float) -> tuple[float, float]:
+    """
+    Return the right sides of (10) and (11).
+
+    :param s: state record with the alphas.
+    :param c: settings record.
+    :param pull: ah5/p of the coupling in (10), 0 for none.
+    :param gain: slope of Phi sigm(xi2) in the boundary layer [1/s].
+    :param phi: Phi of (15) [1/s2].
+    :param xh1: estimate of the position [1].
+    :param xh2: estimate of the velocity [1/s].
+    :param x1: position [1].
+    :param x2: velocity [1/s].
+    :param u: input [1].
+    :return: derivatives of xh1 [1/s] and xh2 [1/s2].
+    """
+    xi1 = x1 - xh1
+    xi2 = x2 - xh2
+    robust = min(max(gain * xi2, -abs(phi)), abs(phi))  # Phi sigm(xi2)
+    return (x2 + c.k1 * xi1 - pull * xi2,
+            s.ah4 * u - s.ah5 * xh1 - s.ah1 * xh2 + c.k2 * xi2 + robust)
+
+
+@jit
 def observe_printed(s: Any, c: Any, dt: float, x1_0: float, x2_0: float, u_0: float, x1: float,
                     x2: float, u: float) -> None:
     """
@@ -86,7 +113,9 @@ def observe_printed(s: Any, c: Any, dt: float, x1_0: float, x2_0: float, u_0: fl
 
     :param s: state record as in `observe`; phi is that of the sample before on entry.
     :param c: settings record.
-    :param dt: time step [s]; k2 dt must stay below 2.7.
+    Where Phi has drifted so far that the step cannot resolve the boundary layer, it is widened.
+
+    :param dt: time step [s]; k2 dt must stay below 2.5.
     :param x1_0: position at the sample before [1].
     :param x2_0: velocity there [1/s].
     :param u_0: input there [1].
@@ -94,26 +123,24 @@ def observe_printed(s: Any, c: Any, dt: float, x1_0: float, x2_0: float, u_0: fl
     :param x2: velocity [1/s].
     :param u: input [1].
     """
+    terms = honn.sigmoids(x2)  # first, while there is no other number to be kept over the calls
     phi_0 = honn.bound(s, x2_0)  # with the regressors of then and the weights of now
-    honn.regress(s, x2)
+    honn.regress(s, terms)
     s.phi = honn.bound(s, x2)
     pull = s.ah5 / c.coupling if c.coupling > 0.0 else 0.0
-    slope1, slope2, sum1, sum2 = 0.0, 0.0, 0.0, 0.0
-    for stage in range(4):
-        part = 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5)
-        weight = 1.0 if stage == 0 or stage == 3 else 2.0
-        xh1 = s.xh1 + part * dt * slope1
-        xh2 = s.xh2 + part * dt * slope2
-        xi1 = x1_0 + part * (x1 - x1_0) - xh1
-        xi2 = x2_0 + part * (x2 - x2_0) - xh2
-        phi = phi_0 + part * (s.phi - phi_0)
-        slope1 = x2_0 + part * (x2 - x2_0) + c.k1 * xi1 - pull * xi2
-        slope2 = (-s.ah1 * xh2 - s.ah5 * xh1 + s.ah4 * (u_0 + part * (u - u_0)) + c.k2 * xi2
-                  + phi * min(max(xi2 / c.delta, -1.0), 1.0))
-        sum1 += weight * slope1
-        sum2 += weight * slope2
-    s.xh1 += dt / 6.0 * sum1
-    s.xh2 += dt / 6.0 * sum2
+    half, steep = 0.5 * dt, 1.0 / c.delta
+    room = max(STIFFEST / max(dt, SHORTEST) - c.k2 - s.ah1, 0.0)
+    x1_m, x2_m = 0.5 * (x1_0 + x1), 0.5 * (x2_0 + x2)
+    u_m, phi_m = 0.5 * (u_0 + u), 0.5 * (phi_0 + s.phi)
+    g_0, g_m, g_1 = (min(max(steep * phi_0, -room), room), min(max(steep * phi_m, -room), room),
+                     min(max(steep * s.phi, -room), room))
+    xh1, xh2 = s.xh1, s.xh2
+    p1, p2 = slopes(s, c, pull, g_0, phi_0, xh1, xh2, x1_0, x2_0, u_0)
+    q1, q2 = slopes(s, c, pull, g_m, phi_m, xh1 + half * p1, xh2 + half * p2, x1_m, x2_m, u_m)
+    r1, r2 = slopes(s, c, pull, g_m, phi_m, xh1 + half * q1, xh2 + half * q2, x1_m, x2_m, u_m)
+    v1, v2 = slopes(s, c, pull, g_1, s.phi, xh1 + dt * r1, xh2 + dt * r2, x1, x2, u)
+    s.xh1 = xh1 + dt / 6.0 * (p1 + 2.0 * (q1 + r1) + v1)
+    s.xh2 = xh2 + dt / 6.0 * (p2 + 2.0 * (q2 + r2) + v2)
     s.xi1 = x1 - s.xh1
     s.xi2 = x2 - s.xh2
 
@@ -142,6 +169,8 @@ def adapt_alpha(s: Any, c: Any, dt: float, x1: float, u: float) -> None:
     :param x1: position [1].
     :param u: input [1].
     """
+    if c.g1 == 0.0 and c.g4 == 0.0 and c.g5 == 0.0:
+        return
     s.ah1 = clip(s.ah1 - dt * c.g1 * s.xh2 * s.xi2, c.alpha1, c.band)
     s.ah4 = clip(s.ah4 + dt * c.g4 * u * s.xi2, c.alpha4, c.band)
     s.ah5 = clip(s.ah5 - dt * c.g5 * x1 * s.xi2, c.alpha5, c.band)

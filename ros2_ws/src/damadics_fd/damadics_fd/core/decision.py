@@ -63,6 +63,8 @@ def vote(s: Any, c: Any, exceed: bool, ratio: float) -> int:
     :param ratio: residual / threshold.
     :return: 0 for no decision, 1 maintenance, 2 out of specification, 3 failure.
     """
+    if not exceed and s.count[0] == 0:
+        return 0  # nothing to count, nothing to forget: the other levels have seen less
     level = 0
     newest = 1 << (c.decide_n - 1)
     limit = c.level_maintenance

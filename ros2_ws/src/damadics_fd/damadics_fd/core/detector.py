@@ -76,7 +76,7 @@ def step(s: Any, c: Any, g: Any, gc: Any, e: Any, d: Any) -> None:
     :param g: state record of the signature.
     :param gc: settings record of the signature.
     :param e: estimate record.
-    :param d: decision record, written.
+    :param d: decision record: what `report` does not tell is written.
     """
     armed = decision.armed(e.phase)
     residual = abs(e.xi2)
@@ -104,7 +104,6 @@ def step(s: Any, c: Any, g: Any, gc: Any, e: Any, d: Any) -> None:
     if s.moved < 0 or e.stamp < s.moved or abs(e.x1 - s.place) > STIR:
         s.place = e.x1
         s.moved = e.stamp
-    report(s, g, gc, e, d)
 
 
 @jit
@@ -161,7 +160,10 @@ def judge(s: NDArray, c: NDArray, g: NDArray, gc: NDArray, reason: NDArray, e: N
             continue
         row = i if keep else kept
         step(s[0], c[0], g[0], gc[0], e[i], d[row])
-        if d[row].transitions != 0:
+        news = d[row].transitions != 0
+        if keep or news:
+            report(s[0], g[0], gc[0], e[i], d[row])
+        if news:
             kept += 1
             if not keep and kept == len(d):
                 return i + 1, kept

@@ -67,7 +67,7 @@ def events_of(decision: Any) -> tuple[Event, ...]:
     """
     List the transitions in a decision.
 
-    :param decision: a `Decision` or a row of `Result.decisions`.
+    :param decision: a `Decision`.
     :return: one event per transition, with the evidence.
     """
     bits = int(decision.transitions)

@@ -12,43 +12,47 @@ STATE = [('w1', 'f8', (N,)), ('w2', 'f8', (N,)), ('eps1', 'f8'), ('b1', 'f8'),
          ('S1', 'f8', (N,)), ('S2', 'f8', (N,))]
 
 
-@jit
-def sigmoid(x: float, m: float, slope: float, center: float, shift: float) -> float:
-    """
-    Return the printed sigmoid m / (1 + exp(-l (x - c))) + lambda.
-
-    :param x: input.
-    :param m: height m.
-    :param slope: slope l.
-    :param center: centre c.
-    :param shift: offset lambda.
-    :return: its value.
-    """
-    power = -slope * (x - center)
-    if power > 700.0:  # exp would overflow; the sigmoid is at its lower end
-        return shift
-    return m / (1.0 + math.exp(power)) + shift
+M1, L1, C1, LAMBDA1 = 1.41, -10.0225, 0.5974, -2.11  # m, l, c, lambda of S1
+M2, L2, C2, LAMBDA2 = 0.8, -4.0, 2.119, -1.5  # of S2
+LARGEST = 700.0  # exp of more overflows; the sigmoid is at its lower end long before
+MIRROR = math.exp(2.0 * L1 * C1)
 
 
 @jit
-def regress(s: Any, x2: float) -> None:
+def sigmoids(x2: float) -> tuple[float, float, float]:
     """
-    Set S1 and S2 of (15) for a velocity.
+    Return the printed sigmoids s(x) = m / (1 + exp(-l (x - c))) + lambda for a velocity.
+
+    :param x2: velocity / stroke [1/s].
+    :return: s(x2) and s(|x2|) of S1, s(|x2|) of S2.
+    """
+    speed = abs(x2)
+    fast = math.exp(min(-L1 * (speed - C1), LARGEST))
+    slow = math.exp(min(-L2 * (speed - C2), LARGEST))
+    # the exponential of -|x2| is MIRROR / fast; one division and no branch for both signs, since
+    # noise makes that of a resting stem change at random
+    above = 1.0 if x2 >= 0.0 else fast
+    below = fast if x2 >= 0.0 else MIRROR
+    return (M1 * above / (above + below) + LAMBDA1, M1 / (1.0 + fast) + LAMBDA1,
+            M2 / (1.0 + slow) + LAMBDA2)
+
+
+@jit
+def regress(s: Any, terms: tuple[float, float, float]) -> None:
+    """
+    Set S1 and S2 of (15) for the sigmoids of a velocity.
 
     S1 holds all products of total order 1 and 2 of s(x2), s(|x2|); S2 the powers 1..5 of s(|x2|).
 
     :param s: state record with S1, S2.
-    :param x2: velocity / stroke [1/s].
+    :param terms: what `sigmoids` returns.
     """
-    speed = abs(x2)
-    b = sigmoid(speed, 1.41, -10.0225, 0.5974, -2.11)
-    a = b if x2 >= 0.0 else sigmoid(x2, 1.41, -10.0225, 0.5974, -2.11)
+    a, b, c = terms
     s.S1[0] = a
     s.S1[1] = b
     s.S1[2] = a * a
     s.S1[3] = a * b
     s.S1[4] = b * b
-    c = sigmoid(speed, 0.8, -4.0, 2.119, -1.5)
     power = 1.0
     for i in range(N):
         power *= c

