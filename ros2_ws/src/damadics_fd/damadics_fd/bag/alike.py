@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Messages that all have their fields at the same places, decoded in one pass over a chunk."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, Self
 
 import numpy as np
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from damadics_fd.bag import kernels
 from damadics_fd.bag.cdr import Layout, Place
-from damadics_fd.bag.kernels import LOG_TIME, Words
+from damadics_fd.bag.kernels import BODY_AT, LOG_TIME, Words
 from damadics_fd.bag.records import HEAD, MESSAGE, Op
 
 WIDE = ('f8', 'i8', 'u8')
@@ -32,10 +32,10 @@ class Alike:
         self.size = size
         self.kinds = {name: place.dtype for name, place in wide.items()}
         self.kinds |= dict.fromkeys(('log_time', *times), 'i8')
-        self._places = np.array([place for place, _ in layout.lengths], np.int64)
+        self._places = _in_record(place for place, _ in layout.lengths)
         self._values = np.array([value for _, value in layout.lengths], np.uint32)
-        self._offsets = np.array([*(p.offset for p in wide.values()), LOG_TIME], np.int64)
-        self._times = np.array(list(times.values()), np.int64)
+        self._offsets = _in_record([*(p.offset for p in wide.values()), LOG_TIME])
+        self._times = _in_record(times.values())
 
     @classmethod
     def of(cls, layout: Layout, size: int, places: Mapping[str, Place | int]) -> Self | None:
@@ -67,6 +67,11 @@ class Alike:
     def columns(self, block: NDArray[np.uint64]) -> dict[str, NDArray[Any]]:
         """View a block as columns."""
         return {name: block[row].view(kind) for row, (name, kind) in enumerate(self.kinds.items())}
+
+
+def _in_record(places: Iterable[int]) -> NDArray[np.uint64]:
+    """Count places in the data of a message from the begin of its record."""
+    return np.array([BODY_AT + place for place in places], np.uint64)
 
 
 def first_message(data: NDArray[np.uint8], number: int) -> tuple[int, int] | None:

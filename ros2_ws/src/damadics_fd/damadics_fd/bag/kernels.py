@@ -99,45 +99,45 @@ def decode(
     :param end: its size [B].
     :param channel: number of the channel.
     :param size: size of each message [B].
-    :param places: places in a message of the words that must be as expected.
+    :param places: places in a Message record of the words that must be as expected, uint64.
     :param values: these words.
-    :param offsets: places of the 64-bit fields, k of them.
-    :param times: places of the fields of builtin_interfaces/Time, m of them.
+    :param offsets: places of the 64-bit fields in a record, k of them, uint64.
+    :param times: places of the fields of builtin_interfaces/Time, m of them, uint64.
     :param out: written from column `first` on, (k + m, most) uint64; times in ns.
     :param first: column of the first message.
     :return: number of messages, -1 where anything is else than expected.
     """
-    at = 0
-    n = first
-    k = len(offsets)
-    length = np.uint64(size + BESIDES)
-    while at + HEAD <= end:
-        here = words.w8[at + 1]
-        if words.w1[at] != MESSAGE or here > np.uint64(end - at - HEAD):
+    # unsigned throughout: of a signed place numba asks each time whether it counts from the end
+    at, stop, head, one = np.uint64(0), np.uint64(end), np.uint64(HEAD), np.uint64(1)
+    n, room, whole = np.uint64(first), np.uint64(out.shape[1]), np.uint64(size + BESIDES)
+    checks, fields, stamps = np.uint64(len(places)), np.uint64(len(offsets)), np.uint64(len(times))
+    while at + head <= stop:
+        length = words.w8[at + one]
+        if words.w1[at] != MESSAGE or length > stop - at - head or length < np.uint64(BESIDES):
             return -1
-        if here < np.uint64(BESIDES):
-            return -1
-        if words.w2[at + CHANNEL_AT] == channel:
-            if here != length or n == out.shape[1]:
+        if words.w2[at + np.uint64(CHANNEL_AT)] == channel:
+            if length != whole or n == room:
                 return -1
-            body = at + BODY_AT
-            same = words.w2[body] == PLAIN_CDR
-            for j in range(len(places)):
-                same = same and words.w4[body + places[j]] == values[j]
+            same = words.w2[at + np.uint64(BODY_AT)] == PLAIN_CDR
+            for j in range(checks):
+                same = same and words.w4[at + places[j]] == values[j]
             if not same:
                 return -1
-            for j in range(k):
-                out[j, n] = words.w8[body + offsets[j]]
-            for j in range(len(times)):
-                second = np.int64(np.int32(words.w4[body + times[j]]))
-                out[k + j, n] = second * BILLION + np.int64(words.w4[body + times[j] + 4])
-            n += 1
-        at += HEAD + np.int64(here)
-    return n - first if at == end else -1
+            for j in range(fields):
+                out[j, n] = words.w8[at + offsets[j]]
+            for j in range(stamps):
+                place = at + times[j]
+                second = np.int64(np.int32(words.w4[place]))
+                nanosecond = np.int64(words.w4[place + np.uint64(4)])
+                out[fields + j, n] = second * BILLION + nanosecond
+            n += one
+        at += head + length
+    return np.int64(n) - first if at == stop else -1
 
 
 def warm_up() -> None:
     """Compile the loops, or load them from the cache."""
     data, none = words(np.zeros(SHORTEST, np.uint8)), np.empty(0, np.int64)
     index(data, 0, np.empty(0, np.uint16), none, none, none)
+    none = none.view(np.uint64)
     decode(data, 0, 0, 0, none, np.empty(0, np.uint32), none, none, np.empty((1, 2), np.uint64), 0)

@@ -33,6 +33,7 @@ from damadics_fd.bag.unpack import open_plain
 from damadics_fd.bag.wellformed import well_formed
 
 LOOSE = 1 << 20  # [B] handled at a time where there are no chunks
+BEGIN = 512  # [B] of the content of a record, read with its head
 _HEAD_PATTERN = re.compile(rb'[\x01-\x0f](?=.{4}\x00{4})', re.DOTALL)
 
 
@@ -216,12 +217,13 @@ class McapFile:
 
     def _record(self, at: int) -> '_Found':
         """Read the record at a place; raise where there is none."""
-        head = self._read(at, HEAD.size)
-        if len(head) < HEAD.size:
+        begin = self._read(at, HEAD.size + BEGIN)
+        if len(begin) < HEAD.size:
             raise BagError('ends in the middle of a record')
-        op, length = HEAD.unpack(head)
+        op, length = HEAD.unpack_from(begin)
+        content = begin[HEAD.size:][:length]
         if op == Op.CHUNK and not self._chunked:
-            self._chunked = well_formed(Op.CHUNK, self._read(at + HEAD.size, 512), length)
+            self._chunked = well_formed(Op.CHUNK, content, length)
         if at + HEAD.size + length > self._size:
             raise BagError('ends in the middle of a record, or the record is damaged')
         if length > self.limits.record:
@@ -234,7 +236,8 @@ class McapFile:
         if op == Op.CHUNK:
             chunk = self._loader.load(at + HEAD.size, length)
             return _Found(op, length, chunk=chunk)
-        content = self._read(at + HEAD.size, length if op in _PARSED else min(length, 512))
+        if op in _PARSED and length > BEGIN:
+            content = self._read(at + HEAD.size, length)
         if not well_formed(op, content, length):
             raise BagError(f'the {op.name} record is damaged')
         self._note(op, content)
@@ -302,14 +305,14 @@ class McapFile:
         if self._chunked and self._read(at, 1)[0] == Op.MESSAGE:
             return False
         for _ in range(links):
-            head = self._read(at, HEAD.size + 512)
-            if len(head) < HEAD.size:
+            begin = self._read(at, HEAD.size + BEGIN)
+            if len(begin) < HEAD.size:
                 return False
-            op, length = HEAD.unpack_from(head)
+            op, length = HEAD.unpack_from(begin)
             end = at + HEAD.size + length
             if not 0 < op < 0x10 or length > self.limits.record or end > self._size:
                 return False
-            if not well_formed(Op(op), head[HEAD.size:][:length], length):
+            if not well_formed(Op(op), begin[HEAD.size:][:length], length):
                 return False
             if op == Op.FOOTER or end == self._size:
                 return True

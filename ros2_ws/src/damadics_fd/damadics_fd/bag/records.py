@@ -191,7 +191,9 @@ def parse_chunk(content: bytes | memoryview) -> tuple[ChunkHead, memoryview]:
     start, end, size, crc = fields.unpack(CHUNK)
     compression = fields.string()
     (length,) = fields.unpack(_U64)
-    return ChunkHead(start, end, size, crc, compression), fields.take(length)
+    if length != fields.left:
+        raise BagError('the CHUNK record is damaged')
+    return ChunkHead(start, end, size, crc, compression), fields.rest()
 
 
 def parse_metadata(content: bytes | memoryview) -> tuple[str, dict[str, str]]:

@@ -108,9 +108,9 @@ def _parse(data: memoryview) -> Summary:
             index = Fields(content)
             _, _, offset, summary.lengths[offset] = index.unpack(CHUNK_INDEX)
             entries = np.frombuffer(index.bytes_(), '<u2,<u8')
-            summary.chunks[offset] = {int(number): int(at) for number, at in entries}
+            summary.chunks[offset] = dict(entries.tolist())
         elif op == Op.STATISTICS:
             counts = Fields(content[46:])
             pairs = np.frombuffer(counts.rest(), '<u2,<u8')
-            summary.counts = {int(number): int(count) for number, count in pairs}
+            summary.counts = dict(pairs.tolist())
     return summary

@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 from damadics_fd.bag.crc import crc32
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.limits import Limits
-from damadics_fd.bag.records import ChunkHead, Op, parse_chunk
-from damadics_fd.bag.wellformed import well_formed
+from damadics_fd.bag.records import ChunkHead, parse_chunk
 
 _ZSTD_MAGIC = b'\x28\xb5\x2f\xfd'
 _FOREIGN = {
     b'SQLite f': 'is an SQLite bag; convert it: ros2 bag convert with storage_id mcap',
     b'#ROSBAG ': 'is a ROS 1 bag; convert it: rosbags-convert --dst-storage mcap',
+    b'PK\x03\x04': 'is a ZIP archive; unpack it first',
+    b'\x1f\x8b': 'is compressed by gzip; unpack it first',
 }
 
 
@@ -48,8 +49,6 @@ class Slot:
         content = memoryview(self._packed)[:length]
         if os.preadv(fd, [content], at) < length:
             raise BagError('ends in the middle of a record')
-        if not well_formed(Op.CHUNK, bytes(content[:512]), length):
-            raise BagError('the CHUNK record is damaged')
         chunk, packed = parse_chunk(content)
         if chunk.size > limits.chunk or chunk.size > max(1 << 16, limits.ratio * len(packed)):
             raise BagError(f'a chunk of {chunk.size} bytes from {len(packed)} is beyond the limit')
@@ -86,7 +85,7 @@ class Slot:
         done = 0
         while done < len(data) and (count := reader.readinto(data[done:])):
             done += count
-        return done + len(reader.read(1))
+        return done + len(reader.read(1)) if stated == -1 else done
 
 
 def _lz4(packed: memoryview, size: int) -> bytes:
@@ -116,9 +115,10 @@ def open_plain(path: Path, limits: Limits) -> BinaryIO:
     if start.startswith(_ZSTD_MAGIC):
         with stream:
             return _unpacked(stream, path, limits)
-    if not start or start in _FOREIGN:
+    foreign = next((text for magic, text in _FOREIGN.items() if start.startswith(magic)), '')
+    if foreign or not start:
         stream.close()
-        raise BagError(_FOREIGN.get(start, 'is empty'), path)
+        raise BagError(foreign or 'is empty', path)
     return stream
 
 
