@@ -178,12 +178,15 @@ def publish(
             player.wait_for_subscribers(inputs_only)
             with tqdm(unit=' samples', unit_scale=True, desc=recording.name, disable=None) as bar:
                 truth = recording.truth(lambda text: None)
+                columns = None
                 for columns in joined(recording.chunks(_warn)):
                     for _ in player.play(_with_truth(columns, truth)):
                         bar.update()
                         if not rclpy.ok():
                             return 0
             player.finish()
+            if columns is None:
+                _warn(f'{recording.name}: has no measurement: the topic is empty')
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     finally:

@@ -19,7 +19,7 @@ from damadics_fd.core.alarm import RAISED
 from damadics_fd.core.detector import Detector
 from damadics_fd.core.events import Event
 from damadics_fd.core.pipeline import Result, run, watch
-from damadics_fd.core.quality import REASONS
+from damadics_fd.core.quality import EXPLANATIONS, REASONS, REMEDIES
 from damadics_fd.core.scada.estimator import estimator_for
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.signature import Signature
@@ -31,6 +31,8 @@ NANO = 1e9
 NAMING_S = (30.0, 300.0, np.inf)  # after an alarm; a later fault must not change the name
 STRIDE = 120  # rows between two attempts of mode scada to name a fault
 JUDGEMENT = ('cause', 'confidence', 'strength', 'spread')
+NEEDED = {'paper': ('cv', 'x1'), 'scada': ('cv', 'x1', 'p1', 'p2'),
+          'monitor': ('cv', 'x1', 'p1', 'p2', 'ps')}
 PIECE = 8192  # rows judged at once: they fit the cache, and calls cost nothing against them
 
 
@@ -47,6 +49,7 @@ class Outcome:
     :param detections: `t` [s] since scenario zero (since the first sample for real data), `stamp`
         [ns] and the evidence of each.
     :param refused: samples that never reached the filters, by reason.
+    :param status: what the estimator did at the end: monitoring, still learning, ...
     :param problems: damaged places in the file, which were left out.
     :param error: why it could not be replayed, '' where it was.
     """
@@ -58,6 +61,7 @@ class Outcome:
     samples_per_s: float = 0.0
     detections: list[dict[str, Any]] = field(default_factory=list)
     refused: dict[str, int] = field(default_factory=dict)
+    status: str = ''
     problems: list[str] = field(default_factory=list)
     error: str = ''
 
@@ -85,6 +89,11 @@ class Chain:
     def signature(self) -> Signature:
         """The valve signature."""
         return self._detector.signature
+
+    @property
+    def status(self) -> str:
+        """What the estimator does, in a few words."""
+        return self._estimator.status
 
     @property
     def refused(self) -> dict[str, int]:
@@ -176,6 +185,7 @@ def _replay(
     flags = FlagWriter(plan.bags / f'{stem}_flags.mcap', recording) if plan.bags else None
     thinner = Thinner() if plan.figures else None
     forces = ForceMap(chain.signature) if plan.figures and plan.mode == 'monitor' else None
+    lacking = set(NEEDED[plan.mode])
     spent = 0.0
     pieces = joined(recording.chunks(outcome.problems.append))
     try:
@@ -185,6 +195,7 @@ def _replay(
             if columns is None:
                 break
             stamp = columns['stamp']
+            lacking &= {name for name in lacking if np.isnan(columns.get(name, np.nan)).all()}
             if (stamp < 0).any():
                 raise BagError('has stamps that have rolled over: see verify', recording.name)
             if zero is None or first is None:
@@ -209,12 +220,30 @@ def _replay(
         raise BagError('has no measurement: the topic is empty', recording.name)
     outcome.duration_s = (last - first) / NANO
     outcome.samples_per_s = outcome.samples / spent
-    outcome.refused = chain.refused
+    outcome.refused, outcome.status = chain.refused, chain.status
+    _judge_refused(outcome, lacking)
     if thinner and plan.figures:
         _draw(thinner, recording, outcome, plan.figures / f'{stem}.png')
     if forces and plan.figures and chain.signature.view().state >= STATE_VERIFY:
         force_over_position(forces, chain.signature, plan.figures / f'{stem}_signature.png',
                             Path(recording.name).name)
+
+
+def _judge_refused(outcome: Outcome, lacking: set[str]) -> None:
+    """Say why most samples were refused; where all were, there is no result."""
+    refused = sum(outcome.refused.values())
+    if 2 * refused < outcome.samples:
+        return
+    reason = max(outcome.refused, key=lambda name: outcome.refused[name])
+    why = f'{EXPLANATIONS[reason]}; {REMEDIES[reason]}'
+    if lacking:
+        why = (f'{", ".join(sorted(lacking))} not measured, but mode {outcome.mode} needs'
+               f' {", ".join(NEEDED[outcome.mode])}: name the signals with --map, or take'
+               ' another --mode')
+    text = f'{refused} of {outcome.samples} samples were refused ({reason}): {why}'
+    if refused == outcome.samples:
+        raise BagError(text, outcome.bag)
+    outcome.problems.append(f'{outcome.bag}: {text}')
 
 
 def joined(pieces: Iterable[Columns]) -> Iterator[Columns]:

@@ -5,21 +5,23 @@
 import argparse
 import multiprocessing
 import os
+import re
 import sys
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, wait
+from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
 import yaml
 from tqdm import tqdm
 
-from damadics_fd.bag.errors import BagError
+from damadics_fd.bag.errors import BagError, NoMeasurementError
 from damadics_fd.bag.recording import Recording, find_recordings, parse_maps
 from damadics_fd.core.modes import MODES
 from damadics_fd.core.settings import Settings, SettingsError
 from damadics_fd.offline import Outcome, Plan, replay, warm_up
-from damadics_fd.replay_output import check_format, print_table, write_outcomes
+from damadics_fd.replay_output import check_format, make_folder, print_table, write_outcomes
 from damadics_fd.ros.commands import split_ros_args
 
 EXAMPLES = """examples:
@@ -28,6 +30,9 @@ EXAMPLES = """examples:
   ros2 run damadics_fd replay 17112001.txt --actuator 1 --mode scada
   ros2 run damadics_fd replay valve.mcap --map cv=/pos/setpoint.data*0.01 --map x1=/pos/stem.data
   ros2 run damadics_fd replay bags/spring --live --rate 2"""
+BESIDE = Path()  # bags with the flags go next to the inputs
+WARNINGS = 3  # shown per recording
+_SUFFIX = re.compile(r'(\.mcap(\.zstd)?|\.csv|\.txt|\.tsv)$', re.IGNORECASE)
 _counter: Any = None  # samples done by all workers
 
 
@@ -52,18 +57,22 @@ def arguments(args: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument('--out', type=Path, metavar='FILE',
                         help='write the result: .json, .csv or .parquet')
     parser.add_argument('--figures', type=Path, metavar='DIR', help='draw the six panels')
-    parser.add_argument('--bag', type=Path, nargs='?', const=Path(), metavar='DIR',
+    parser.add_argument('--bag', type=Path, nargs='?', const=BESIDE, metavar='DIR',
                         help='write the flags as MCAP, next to the input if no DIR is given')
     parser.add_argument('--jobs', type=int, default=len(os.sched_getaffinity(0)),
                         help='processes (default: one per core)')
     parser.add_argument('--live', action='store_true',
                         help='publish on the topics, with /clock, instead')
-    parser.add_argument('--rate', type=float, default=1.0,
+    parser.add_argument('--rate', type=float,
                         help='speed of --live in multiples of real time (default 1)')
     parser.add_argument('--inputs-only', action='store_true',
                         help='with --live: publish no results, for nodes that run')
     options = parser.parse_args(args)
-    if options.rate <= 0.0:
+    if options.live and (options.out or options.figures or options.bag):
+        parser.error('--live writes no files: leave out --out, --figures and --bag')
+    if not options.live and (options.rate is not None or options.inputs_only):
+        parser.error('--rate and --inputs-only go with --live')
+    if options.rate is not None and not options.rate > 0.0:
         parser.error('--rate must be positive')
     return options
 
@@ -81,7 +90,10 @@ def settings_of(options: argparse.Namespace) -> dict[str, Any]:
         name, equals, value = text.partition('=')
         if not equals:
             raise SettingsError([f'--set {text}: write NAME=VALUE'])
-        values[name] = yaml.safe_load(value)
+        try:
+            values[name] = yaml.safe_load(value)
+        except yaml.YAMLError as error:
+            raise SettingsError([f'--set {text}: the value cannot be read']) from error
     values.pop('mode', None)
     Settings.for_mode(options.mode, **values)
     return values
@@ -109,19 +121,36 @@ def main(args: list[str] | None = None) -> int:
     """Run the command."""
     words, ros_args = split_ros_args(args)
     options = arguments(words)
+    failed: list[BagError] = []
+
+    def left_out(error: BagError) -> None:
+        if isinstance(error, NoMeasurementError):
+            print(f'replay: warning: {error}; it is left out', file=sys.stderr)
+        else:
+            failed.append(error)
+
     try:
+        settings = settings_of(options)
         if options.out:
             check_format(options.out)
-        settings = settings_of(options)
+        for folder in (options.out and options.out.parent, options.figures, options.bag):
+            if folder and folder != BESIDE:
+                make_folder(folder)
         recordings = find_recordings(
-            options.bags, options.topic, parse_maps(options.map), options.actuator
+            options.bags, options.topic, parse_maps(options.map), options.actuator, left_out
         )
         plan = Plan(options.mode, settings, options.figures, options.bag)
         if options.live:
             from damadics_fd.live import publish
 
-            return publish(recordings, plan, options.rate, options.inputs_only, ros_args)
+            code = publish(recordings, plan, options.rate or 1.0, options.inputs_only, ros_args)
+            return max(code, report_errors(failed))
         outcomes = replay_all(recordings, plan, options.jobs)
+        outcomes += [Outcome(str(error.path), plan.mode, error=str(error)) for error in failed]
+        if recordings:
+            print_table(outcomes)
+        for outcome in outcomes:
+            report_problems(outcome.problems)
         if options.out:
             write_outcomes(outcomes, options.out)
     except (BagError, SettingsError, RuntimeError, OSError) as error:
@@ -130,13 +159,22 @@ def main(args: list[str] | None = None) -> int:
     except KeyboardInterrupt:
         print('replay: stopped', file=sys.stderr)
         return 130
-    print_table(outcomes)
-    for outcome in outcomes:
-        for problem in outcome.problems[:3]:
-            print(f'replay: warning: {problem}', file=sys.stderr)
-        if outcome.error:
-            print(f'replay: {outcome.error}', file=sys.stderr)
-    return int(any(outcome.error for outcome in outcomes))
+    return report_errors([outcome.error for outcome in outcomes if outcome.error])
+
+
+def report_problems(problems: Sequence[str]) -> None:
+    """Print the first few warnings and how many more there are."""
+    for problem in problems[:WARNINGS]:
+        print(f'replay: warning: {problem}', file=sys.stderr)
+    if len(problems) > WARNINGS:
+        print(f'replay: and {len(problems) - WARNINGS} more warnings like it', file=sys.stderr)
+
+
+def report_errors(errors: Sequence[object]) -> int:
+    """Print errors and return the exit code."""
+    for error in errors:
+        print(f'replay: {error}', file=sys.stderr)
+    return int(bool(errors))
 
 
 def replay_all(recordings: Sequence[Recording], plan: Plan, jobs: int) -> list[Outcome]:
@@ -171,22 +209,23 @@ def replay_all(recordings: Sequence[Recording], plan: Plan, jobs: int) -> list[O
 
 def _placed(plan: Plan, recording: Recording) -> Plan:
     """Put bags next to the input where no folder is given."""
-    if plan.bags != Path():
+    if plan.bags != BESIDE:
         return plan
-    return Plan(plan.mode, plan.settings, plan.figures, recording.path.parent)
+    return Plan(plan.mode, plan.settings, plan.figures, recording.path.resolve().parent)
 
 
 def unique_stems(recordings: Sequence[Recording]) -> Iterator[str]:
     """Yield a file name for each recording, no two alike."""
-    seen: dict[str, int] = {}
+    taken: set[str] = set()
     for recording in recordings:
-        stem = recording.path.name.split('.')[0]
+        stem = _SUFFIX.sub('', recording.path.resolve().name)
         if recording.table and recording.table.name:
             stem += f'_{recording.table.name}'
         elif recording.topic != '/measurement':
             stem += recording.topic.removesuffix('measurement').rstrip('/').replace('/', '_')
-        seen[stem] = seen.get(stem, 0) + 1
-        yield stem if seen[stem] == 1 else f'{stem}_{seen[stem]}'
+        names = chain([stem], (f'{stem}_{number}' for number in count(2)))
+        taken.add(stem := next(name for name in names if name not in taken))
+        yield stem
 
 
 def _start(counter: Any, plan: Plan) -> None:

@@ -4,6 +4,7 @@
 
 import csv
 import json
+import os
 from collections.abc import Sequence
 from dataclasses import asdict
 from importlib.util import find_spec
@@ -24,12 +25,14 @@ def print_table(outcomes: Sequence[Outcome]) -> None:
         times = [f'{detection["t"]:.4f}' for detection in outcome.detections[:SHOWN]]
         more = len(outcome.detections) - len(times)
         text = ', '.join(times) + (f', and {more} more' if more else '')
+        if not text:
+            text = 'none' if outcome.status == 'monitoring' else f'none: {outcome.status}'
         refused = sum(outcome.refused.values())
         rows.append((
             outcome.bag, outcome.mode, f'{outcome.samples:,}', f'{outcome.duration_s:.1f} s',
             f'{outcome.samples_per_s / 1e6:.2f} M',
-            outcome.error and 'failed' or (text or 'none')
-            + (f'  ({refused} samples refused)' if refused else ''),
+            'failed' if outcome.error
+            else text + (f'  ({refused} samples refused)' if refused else ''),
         ))
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for row in rows:
@@ -53,6 +56,21 @@ def check_format(path: Path) -> None:
         raise RuntimeError(f'--out {path}: Parquet needs pyarrow: pip install pyarrow')
 
 
+def make_folder(folder: Path) -> None:
+    """
+    Create a folder for results, before the work is done.
+
+    :param folder: the folder.
+    :raises RuntimeError: where nothing can be written to it.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RuntimeError(f'{folder} cannot be created: {error.strerror}') from error
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise RuntimeError(f'{folder} cannot be written to; choose another folder')
+
+
 def write_outcomes(outcomes: Sequence[Outcome], path: Path) -> None:
     """
     Write results to a file.
@@ -65,7 +83,7 @@ def write_outcomes(outcomes: Sequence[Outcome], path: Path) -> None:
     :raises RuntimeError: as `check_format`.
     """
     check_format(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
+    make_folder(path.parent)
     if path.suffix == '.json':
         text = json.dumps([asdict(outcome) for outcome in outcomes], indent=1, allow_nan=False)
         path.write_text(text + '\n', encoding='utf-8')

@@ -93,26 +93,50 @@ def iter_columns(
     seen: set[str] = set()
     empty: Columns | None = None
     delivered = False
-    for file in bag_files(path):
-        with McapFile(file, on_problem is not None, limits) as mcap:
-            decoders: dict[int, Decoder] = {}
-            for at, data in mcap.chunks():
-                for columns in _decoded(mcap, at, data, topic, fields, decoders):
-                    delivered = True
-                    yield columns
-            seen |= {channel.topic for channel in mcap.channels.values()}
-            if on_problem:
-                for problem in mcap.problems:
-                    on_problem(f'{file}: {problem.text} (at byte {problem.offset})')
-            for channel in mcap.channels.values():
-                if channel.topic == topic:
-                    empty = Decoder(mcap, channel.id, fields).empty()
+    for mcap in open_files(path, on_problem, limits):
+        decoders: dict[int, Decoder] = {}
+        for at, data in mcap.chunks():
+            for columns in _decoded(mcap, at, data, topic, fields, decoders):
+                delivered = True
+                yield columns
+        seen |= {channel.topic for channel in mcap.channels.values()}
+        if on_problem:
+            for problem in mcap.problems:
+                on_problem(f'{mcap.path}: {problem.text} (at byte {problem.offset})')
+        for channel in mcap.channels.values():
+            if channel.topic == topic:
+                empty = Decoder(mcap, channel.id, fields).empty()
     if not delivered:
         if empty is None:
             raise BagError(
                 f'has no topic {topic}; it has {", ".join(sorted(seen)) or "none"}', path
             )
         yield empty
+
+
+def open_files(
+    path: str | Path, on_problem: Callable[[str], None] | None, limits: Limits = Limits(),  # noqa: B008
+) -> Iterator[McapFile]:
+    """
+    Open the files of a bag one after the other.
+
+    :param path: MCAP file or bag directory.
+    :param on_problem: told which of several files is none, as a crash or a full disk may leave
+        one; None makes it an error, and damage within the files, too.
+    :param limits: what the files may ask for.
+    :raises BagError: where the bag cannot be opened.
+    """
+    files = bag_files(path)
+    for file in files:
+        try:
+            mcap = McapFile(file, on_problem is not None, limits)
+        except BagError as error:
+            if on_problem is None or len(files) == 1:
+                raise
+            on_problem(str(error))
+            continue
+        with mcap:
+            yield mcap
 
 
 def _decoded(

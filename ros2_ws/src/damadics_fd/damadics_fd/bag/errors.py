@@ -1,6 +1,6 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The one error that everything in `bag` raises."""
+"""The error that everything in `bag` raises."""
 
 from pathlib import Path
 
@@ -17,3 +17,7 @@ class BagError(Exception):
         super().__init__(f'{path}: {reason}' if path else reason)
         self.reason = reason
         self.path = path
+
+
+class NoMeasurementError(BagError):
+    """A file can be read but holds no measurement of a valve."""

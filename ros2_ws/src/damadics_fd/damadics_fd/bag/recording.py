@@ -3,6 +3,7 @@
 """Anything that holds measurements of a valve, as a stream of columns."""
 
 import re
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,11 +11,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from damadics_fd.bag.columns import iter_columns, read_columns
+from damadics_fd.bag.columns import iter_columns, open_files, read_columns
 from damadics_fd.bag.decoder import Columns
-from damadics_fd.bag.errors import BagError
-from damadics_fd.bag.reader import McapFile
-from damadics_fd.bag.sources import bag_files, find_bags
+from damadics_fd.bag.errors import BagError, NoMeasurementError
+from damadics_fd.bag.sources import find_bags
 from damadics_fd.bag.tables import Table, read_table
 
 TABLES = ('.csv', '.txt', '.tsv')
@@ -71,14 +71,12 @@ class Recording:
     :param topic: topic of the measurements in a bag.
     :param maps: where signals are, if not in a `Measurement`.
     :param table: the table, where it is one.
-    :param size: size of its files [B].
     """
 
     path: Path
     topic: str = '/measurement'
     maps: Mapping[str, tuple[str, float]] = field(default_factory=dict)
     table: Table | None = None
-    size: int = 0
 
     @property
     def name(self) -> str:
@@ -96,7 +94,7 @@ class Recording:
         :raises BagError: where it cannot be read.
         """
         if self.table:
-            yield from self.table.chunks()
+            yield from self.table.chunks(on_problem)
         elif self.maps:
             yield self._mapped(on_problem)
         else:
@@ -156,7 +154,7 @@ def hold(stamp: NDArray, values: NDArray, at: NDArray) -> NDArray:
 
 def find_recordings(
     paths: Sequence[str | Path], topic: str | None = None, maps: Mapping = {},  # noqa: B006
-    actuator: int | None = None,
+    actuator: int | None = None, on_problem: Callable[[BagError], None] | None = None,
 ) -> list[Recording]:
     """
     List every valve in files, bags and folders.
@@ -166,60 +164,94 @@ def find_recordings(
         `damadics_msgs/Measurement`.
     :param maps: where signals are, by `parse_maps`.
     :param actuator: actuator of a table with the plant's tags; None for all.
+    :param on_problem: told what is left out: a `NoMeasurementError` where there are recordings
+        beside it, else a plain `BagError`. Where it is None, the latter is raised.
     :return: recordings in the order of the paths.
     :raises BagError: where a path holds none.
     """
     found: list[Recording] = []
     for path in map(Path, paths):
-        tables = [path] if path.suffix.lower() in TABLES else []
-        if path.is_dir():
-            tables = sorted(p for p in path.iterdir() if p.suffix.lower() in TABLES)
-        for table in tables:
-            found += [
-                Recording(table, table=part, size=table.stat().st_size)
-                for part in read_table(table, actuator, maps)
-            ]
-        if tables and not (path.is_dir() and _has_bags(path)):
-            continue
-        for bag in find_bags(path):
-            size = sum(file.stat().st_size for file in bag_files(bag))
-            if maps:
-                found.append(Recording(bag, maps=maps, size=size))
-            else:
-                names = [topic] if topic else measurement_topics(bag)
-                found += [Recording(bag, name, size=size) for name in names]
+        here: list[Recording] = []
+        problems: list[BagError] = []
+        try:
+            for entry in _entries(path):
+                here += _recordings(entry, topic, maps, actuator, problems)
+        except BagError as error:
+            problems.append(error)
+        found += here
+        for problem in problems:
+            beside = here and isinstance(problem, NoMeasurementError)
+            if on_problem:
+                on_problem(problem if beside else BagError(problem.reason, problem.path or path))
+            elif not beside:
+                raise problem
     return found
 
 
-def _has_bags(folder: Path) -> bool:
+def _entries(path: Path) -> list[Path]:
+    """List the tables and bags that a path names."""
+    if not path.is_dir():
+        return [path] if path.suffix.lower() in TABLES else find_bags(path)
+    tables = sorted(p for p in path.iterdir() if p.suffix.lower() in TABLES)
     try:
-        return bool(find_bags(folder))
+        return [*tables, *find_bags(path)]
     except BagError:
-        return False
+        if tables:
+            return tables
+        raise
 
 
-def measurement_topics(path: Path) -> list[str]:
+def _recordings(
+    path: Path, topic: str | None, maps: Mapping, actuator: int | None, problems: list[BagError]
+) -> list[Recording]:
+    """List the valves in one table or bag; `problems` gets what is left out."""
+    try:
+        if path.suffix.lower() in TABLES:
+            return [Recording(path, table=part) for part in read_table(path, actuator, maps)]
+        if maps:
+            return [Recording(path, maps=maps)]
+        if topic:
+            return [Recording(path, topic)]
+        topics = measurement_topics(path)
+    except BagError as error:
+        problems.append(error)
+        return []
+    problems += [NoMeasurementError(f'the topic {name} is empty', path)
+                 for name, count in topics.items() if not count]
+    return [Recording(path, name) for name, count in topics.items() if count]
+
+
+def measurement_topics(path: Path) -> dict[str, int]:
     """
-    List the topics of a bag that hold measurements of a valve.
+    Count the messages of the topics of a bag that hold measurements of a valve.
 
-    :raises BagError: where there is none.
+    :return: at least one topic; where the file does not tell, its messages count as one.
+    :raises NoMeasurementError: where there is none.
+    :raises BagError: where it cannot be read.
     """
     kinds: dict[str, str] = {}
-    for file in bag_files(path):
-        with McapFile(file, tolerant=True) as mcap:
-            if not mcap.channels:
-                for _ in mcap.batches():  # no summary: the channels are among the messages
-                    pass
-            for channel in mcap.channels.values():
-                schema = mcap.schemas.get(channel.schema_id)
-                kinds[channel.topic] = schema.name if schema else ''
-    topics = [
-        topic for topic, kind in kinds.items()
+    counts: Counter[str] = Counter()
+    damage: list[str] = []
+    for mcap in open_files(path, damage.append):
+        sizes: Mapping[int, int] = mcap.summary.counts
+        if not mcap.channels:  # no summary: the channels are among the messages
+            sizes = Counter()
+            for batch in mcap.batches():
+                sizes.update(batch.channels.tolist())
+        damage += [problem.text for problem in mcap.problems]
+        for channel in mcap.channels.values():
+            schema = mcap.schemas.get(channel.schema_id)
+            kinds[channel.topic] = schema.name if schema else ''
+            counts[channel.topic] += sizes.get(channel.id, 0) if sizes else 1
+    if damage and not kinds:
+        raise BagError(f'{damage[0]}, and nothing in it can be read', path)
+    topics = {
+        topic: counts[topic] for topic, kind in sorted(kinds.items())
         if kind == MEASUREMENT or topic.rsplit('/', 1)[-1] == 'measurement'
-    ]
+    }
     if not topics:
-        raise BagError(
+        raise NoMeasurementError(
             f'has no measurement; it has {", ".join(sorted(kinds)) or "no topic"}. Name the'
             ' signals: --map cv=/topic.field --map x1=/topic.field', path,
         )
-    return sorted(topics)
+    return topics

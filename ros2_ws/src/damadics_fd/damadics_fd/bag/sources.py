@@ -44,7 +44,7 @@ def bag_files(path: str | Path) -> list[Path]:
         foreign = next(path.glob('*.db3'), None)
         raise BagError(
             'is an SQLite bag; convert it: ros2 bag convert with storage_id mcap' if foreign
-            else 'holds no .mcap file', path,
+            else 'holds no .mcap file; give a bag, or the folder right above bags', path,
         )
     return files
 

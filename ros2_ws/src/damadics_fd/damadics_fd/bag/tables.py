@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recordings as text: our own CSV, tables with the plant's tags, the daily files of Lublin."""
 
+import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from itertools import islice
@@ -12,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from damadics_fd.bag.errors import BagError
+from damadics_fd.bag.errors import BagError, NoMeasurementError
 
 ROWS = 100_000  # read at a time
 SECOND = 1e9  # [ns]
@@ -38,6 +39,7 @@ LUBLIN = tuple((  # noqa: SIM905
     ' F51_02 PC51_01 T51_06 P51_03 T51_07 P57_03 P57_04 T57_03 FC57_03PV FC57_03CV FC57_03X'
     ' P74_00 P74_01 T74_00 F74_00 LC74_20CV LC74_20X LC74_20PV F74_30 P74_30 T74_30'
 ).split())
+NOT_MEASURED = ('', '-', 'na', 'n/a', '#n/a', 'nan', 'null', 'none')  # in a cell
 Use = tuple[int, float]  # column of the file, factor to SI
 
 
@@ -61,35 +63,67 @@ class Table:
     header: int
     start: int = 0
 
-    def chunks(self) -> Iterator[dict[str, NDArray]]:
+    def chunks(self, on_problem: Callable[[str], None]) -> Iterator[dict[str, NDArray]]:
         """
         Yield the columns in blocks of rows.
 
-        :raises BagError: where a row is no row of numbers.
+        :param on_problem: told of lines that are no row of numbers, which are left out.
+        :raises BagError: where most lines are not.
         """
         use = sorted({column for column, _ in self.columns.values()})
-        with self.path.open(encoding='utf-8') as file:
+        place = {column: i for i, column in enumerate(use)}
+        with self.path.open(encoding='utf-8', errors='replace') as file:
             row = self.header
             for _ in islice(file, self.header):
                 pass
             while lines := list(islice(file, ROWS)):
                 try:
                     block = np.loadtxt(lines, delimiter=self.delimiter, usecols=use, ndmin=2)
-                except ValueError as error:
-                    text = str(error).split(';')[0]
-                    raise BagError(f'behind line {row}: {text}', self.path) from error
+                except ValueError:
+                    block = self._by_line(lines, row, use, on_problem)
                 row += len(lines)
-                if len(block):
-                    yield self._named(block, {column: i for i, column in enumerate(use)})
+                timed = np.isfinite(block[:, place[self.columns['stamp'][0]]])
+                if not timed.all():
+                    on_problem(f'{self.path}: {(~timed).sum()} rows up to line {row} have no time'
+                               ' and are left out')
+                if timed.any():
+                    yield self._named(block[timed], place)
+
+    def _by_line(
+        self, lines: list[str], before: int, use: list[int], on_problem: Callable[[str], None]
+    ) -> NDArray[np.float64]:
+        """Parse lines one by one, as spreadsheets write them and crashes leave them."""
+        rows, bad = [], []
+        for number, line in enumerate(lines, before + 1):
+            cells = line.split(self.delimiter)
+            try:
+                rows.append([parse_cell(cells[column]) for column in use])
+            except (ValueError, IndexError):
+                if line.strip() and not line.startswith('#'):
+                    bad.append(f'line {number}: {line.strip()[:60]!r}')
+        if len(bad) > len(rows):
+            raise BagError(f'{bad[0]} is no row of numbers; time has to be in seconds', self.path)
+        if bad:
+            on_problem(f'{self.path}: {len(bad)} lines are no rows of numbers and are left out,'
+                       f' first {bad[0]}')
+        return np.array(rows, float).reshape(len(rows), len(use))
 
     def _named(self, block: NDArray, place: Mapping[int, int]) -> dict[str, NDArray]:
-        columns: dict[str, NDArray] = {}
-        for name, (column, factor) in self.columns.items():
-            columns[name] = block[:, place[column]] * factor
-        time = columns['stamp']
-        if not np.isfinite(time).all():
-            raise BagError('the time column has gaps', self.path)
-        return columns | {'stamp': np.round(time).astype(np.int64) + self.start}
+        columns = {name: block[:, place[column]] * factor
+                   for name, (column, factor) in self.columns.items()}
+        stamp = np.round(columns['stamp']).astype(np.int64) + self.start
+        return columns | {'stamp': stamp}
+
+
+def parse_cell(text: str) -> float:
+    """
+    Read a number as a spreadsheet may write it.
+
+    >>> parse_cell(' 12,5'), parse_cell(''), parse_cell('"3e-2"')
+    (12.5, nan, 0.03)
+    """
+    text = text.strip().strip('"')
+    return math.nan if text.lower() in NOT_MEASURED else float(text.replace(',', '.'))
 
 
 def read_table(
@@ -102,7 +136,8 @@ def read_table(
     :param actuator: 1, 2 or 3: only this one, where the file has the plant's tags.
     :param chosen: columns named by the user: for each its header and factor to SI.
     :return: one table per actuator.
-    :raises BagError: where the file is no such table or lacks what is needed.
+    :raises NoMeasurementError: where the file is no such table or lacks what is needed.
+    :raises BagError: where it cannot be read, or lacks a column that the user named.
     """
     path = Path(path)
     try:
@@ -116,7 +151,7 @@ def read_table(
     start = 0
     if re.fullmatch(r'[-+\d.eE]+', names[0]):
         if len(names) != len(LUBLIN):
-            raise BagError(
+            raise NoMeasurementError(
                 f'has no header line and {len(names)} columns; name the columns in a first line,'
                 f' or give a daily file of {len(LUBLIN)} columns', path,
             )
@@ -127,7 +162,7 @@ def read_table(
         if {'stamp', 'cv', 'x1'} <= columns.keys()
     ]
     if not tables:
-        raise BagError(
+        raise NoMeasurementError(
             f'lacks a time, a control value or a position; it has the columns {", ".join(names)};'
             ' name them: --map t=TIME --map cv=COLUMN --map x1=COLUMN*0.01', path,
         )
