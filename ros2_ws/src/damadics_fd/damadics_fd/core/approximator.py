@@ -5,7 +5,7 @@
 from typing import Any
 
 from damadics_fd.core import honn
-from damadics_fd.core.jit import jit
+from damadics_fd.core.jit import jit, layer
 
 STATE = [('xh1', 'f8'), ('xh2', 'f8'), ('xi1', 'f8'), ('xi2', 'f8'), ('phi', 'f8'),
          ('ah1', 'f8'), ('ah4', 'f8'), ('ah5', 'f8'), *honn.STATE]
@@ -77,8 +77,8 @@ def observe(s: Any, c: Any, dt: float, x1: float, x2: float, u: float) -> None:
 
 
 @jit
-def slopes(s: Any, c: Any, pull: float, gain: float, phi: float, xh1: float, xh2: float,
-           x1: float, x2: float, u: float) -> tuple[float, float]:
+def slopes(s: Any, c: Any, pull: float, gain: float, phi: float, x1: float, x2: float, u: float,
+           xi1: float, xi2: float) -> tuple[float, float]:
     """
     Return the right sides of (10) and (11).
 
@@ -87,21 +87,20 @@ def slopes(s: Any, c: Any, pull: float, gain: float, phi: float, xh1: float, xh2
     :param pull: ah5/p of the coupling in (10), 0 for none.
     :param gain: slope of Phi sigm(xi2) in the boundary layer [1/s].
     :param phi: Phi of (15) [1/s2].
-    :param xh1: estimate of the position [1].
-    :param xh2: estimate of the velocity [1/s].
     :param x1: position [1].
     :param x2: velocity [1/s].
     :param u: input [1].
+    :param xi1: error x1 - xh1 [1].
+    :param xi2: error x2 - xh2 [1/s].
     :return: derivatives of xh1 [1/s] and xh2 [1/s2].
     """
-    xi1 = x1 - xh1
-    xi2 = x2 - xh2
     robust = min(max(gain * xi2, -abs(phi)), abs(phi))  # Phi sigm(xi2)
+    known = s.ah4 * u - s.ah5 * x1 - s.ah1 * x2
     return (x2 + c.k1 * xi1 - pull * xi2,
-            s.ah4 * u - s.ah5 * xh1 - s.ah1 * xh2 + c.k2 * xi2 + robust)
+            known + s.ah5 * xi1 + (s.ah1 + c.k2) * xi2 + robust)
 
 
-@jit
+@layer
 def observe_printed(s: Any, c: Any, dt: float, x1_0: float, x2_0: float, u_0: float, x1: float,
                     x2: float, u: float) -> None:
     """
@@ -135,10 +134,11 @@ def observe_printed(s: Any, c: Any, dt: float, x1_0: float, x2_0: float, u_0: fl
     g_0, g_m, g_1 = (min(max(steep * phi_0, -room), room), min(max(steep * phi_m, -room), room),
                      min(max(steep * s.phi, -room), room))
     xh1, xh2 = s.xh1, s.xh2
-    p1, p2 = slopes(s, c, pull, g_0, phi_0, xh1, xh2, x1_0, x2_0, u_0)
-    q1, q2 = slopes(s, c, pull, g_m, phi_m, xh1 + half * p1, xh2 + half * p2, x1_m, x2_m, u_m)
-    r1, r2 = slopes(s, c, pull, g_m, phi_m, xh1 + half * q1, xh2 + half * q2, x1_m, x2_m, u_m)
-    v1, v2 = slopes(s, c, pull, g_1, s.phi, xh1 + dt * r1, xh2 + dt * r2, x1, x2, u)
+    e1, e2 = x1_m - xh1, x2_m - xh2
+    p1, p2 = slopes(s, c, pull, g_0, phi_0, x1_0, x2_0, u_0, x1_0 - xh1, x2_0 - xh2)
+    q1, q2 = slopes(s, c, pull, g_m, phi_m, x1_m, x2_m, u_m, e1 - half * p1, e2 - half * p2)
+    r1, r2 = slopes(s, c, pull, g_m, phi_m, x1_m, x2_m, u_m, e1 - half * q1, e2 - half * q2)
+    v1, v2 = slopes(s, c, pull, g_1, s.phi, x1, x2, u, x1 - xh1 - dt * r1, x2 - xh2 - dt * r2)
     s.xh1 = xh1 + dt / 6.0 * (p1 + 2.0 * (q1 + r1) + v1)
     s.xh2 = xh2 + dt / 6.0 * (p2 + 2.0 * (q2 + r2) + v2)
     s.xi1 = x1 - s.xh1
@@ -176,7 +176,7 @@ def adapt_alpha(s: Any, c: Any, dt: float, x1: float, u: float) -> None:
     s.ah5 = clip(s.ah5 - dt * c.g5 * x1 * s.xi2, c.alpha5, c.band)
 
 
-@jit
+@layer
 def adapt_phi(s: Any, c: Any, dt: float, x2: float) -> None:
     """
     Adapt the weights and bounds in Phi by one step of their laws, outside the dead-zone only.

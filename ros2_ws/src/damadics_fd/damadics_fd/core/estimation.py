@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damadics_fd.core import approximator, force, learning, quality, velocity
-from damadics_fd.core.jit import jit
+from damadics_fd.core.jit import jit, layer
 from damadics_fd.core.modes import MONITOR, PAPER, PHASE_PAPER
 
 SUBSTEPS = 1000  # at most, in one gap
@@ -54,7 +54,7 @@ class Estimate(NamedTuple):
         return self.alpha1, self.alpha4, self.alpha5
 
 
-@jit
+@layer
 def advance(s: Any, c: Any, phase: int, dt: float, x1_0: float, x2_0: float, u_0: float,
             x1: float, x2: float, u: float) -> None:
     """

@@ -5,7 +5,7 @@
 import math
 from typing import Any
 
-from damadics_fd.core.jit import jit
+from damadics_fd.core.jit import jit, layer
 
 N = 5  # terms in each regressor
 STATE = [('w1', 'f8', (N,)), ('w2', 'f8', (N,)), ('eps1', 'f8'), ('b1', 'f8'),
@@ -76,7 +76,7 @@ def bound(s: Any, x2: float) -> float:
     return abs(x2) * fast + slow
 
 
-@jit
+@layer
 def learn(s: Any, x2: float, step: float, w_max: float) -> None:
     """
     Adapt the weights of (15) by one Euler step, projected on a ball.

@@ -6,7 +6,7 @@ from typing import Any
 
 from damadics_fd.core import approximator, honn, settled
 from damadics_fd.core.force import plug_coefficient
-from damadics_fd.core.jit import jit
+from damadics_fd.core.jit import jit, layer
 from damadics_fd.core.modes import (
     PAPER,
     PHASE_HOLD,
@@ -237,7 +237,7 @@ def gated(c: Any, x: float) -> bool:
     return x < c.gate_low or x > 1.0 - c.gate_high
 
 
-@jit
+@layer
 def adapt(s: Any, c: Any, phase: int, dt: float, x1: float, x2: float, u: float) -> None:
     """
     Adapt by one step what the phase allows.
@@ -259,7 +259,7 @@ def adapt(s: Any, c: Any, phase: int, dt: float, x1: float, x2: float, u: float)
             approximator.adapt_phi(s, c, dt, x2)
 
 
-@jit
+@layer
 def follow(s: Any, c: Any, phase: int, dt: float) -> None:
     """
     Follow the travel of the stem and collect the settled check's block.

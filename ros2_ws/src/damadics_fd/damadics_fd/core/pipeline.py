@@ -150,13 +150,13 @@ def watch(columns: Mapping[str, NDArray[Any]], settings: Settings, estimator: Es
         return run(columns, settings, estimator, detector).events
     stamp, signals = _contiguous(columns)
     reason, estimates = np.empty(PIECE, np.uint8), np.empty(PIECE, ESTIMATE)
-    decisions = np.empty(ROOM, DECISION)
+    decisions, record = np.empty(ROOM, DECISION), _record(settings)
     events: list[Event] = []
     for first in range(0, len(stamp), PIECE):
         piece = slice(first, first + PIECE)
         n = len(stamp[piece])
-        estimate(estimator.quality, estimator.state, _record(settings), reason, estimates,
-                 stamp[piece], *(signal[piece] for signal in signals))
+        estimate(estimator.quality, estimator.state, record, reason, estimates, stamp[piece],
+                 *(signal[piece] for signal in signals))
         done = 0
         while done < n:
             done, kept = detector.judge(reason[:n], estimates[:n], decisions, False, done)
