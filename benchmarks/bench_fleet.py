@@ -37,6 +37,7 @@ import website  # noqa: E402
 
 TICKS = os.sysconf('SC_CLK_TCK')
 WARM_UP = 5.0  # s after the first sample before CPU time is measured
+PATIENCE = 60.0  # s that the plants may take longer than their scenario
 LAST_WORDS = 2.5  # s from the last sample to the last diagnostics
 
 
@@ -109,7 +110,8 @@ def measure(options: argparse.Namespace, folder: Path) -> None:
     ]
     port = website.free_port()
     tasks = tasks_of(valves, argparse.Namespace(
-        record=None, dashboard=True, simulate=True, port=port, host='127.0.0.1', show=False))
+        record=None, dashboard=True, simulate=True, port=port, host='127.0.0.1', show=False,
+        processes=options.processes))
     domain = free_domain()
     environment = {**surroundings(domain), 'XDG_STATE_HOME': str(folder / 'state')}
     with Processes(folder / 'logs', environment) as processes, website.browser() as chromium:
@@ -151,8 +153,12 @@ def measure(options: argparse.Namespace, folder: Path) -> None:
         span = time.monotonic() - began
         used = {kind: value - before[kind] for kind, value in cpu_times(kinds).items()}
         updates = (page.evaluate('damadics.messages') - shown) / span if page else 0.0
-        while not all(processes.ended(task.label) for task in plants):
+        deadline = time.monotonic() + options.seconds + PATIENCE
+        while late := [task.label for task in plants if not processes.ended(task.label)]:
             counts.spin(0.5)
+            if time.monotonic() > deadline:
+                raise SystemExit(f'{", ".join(late)} did not end; the last words of the first:\n'
+                                 + processes.log(late[0]).read_text()[-1000:])
         counts.spin(LAST_WORDS)
         report(valves, kinds, used, span, counts, processes, updates)
         counts.close()
@@ -190,6 +196,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
     parser.add_argument('--valves', type=int, default=10)
     parser.add_argument('--rate', type=float, default=200.0, help='samples per second [Hz]')
+    parser.add_argument('--processes', type=int, default=0, metavar='N',
+                        help='all estimators and detectors in N processes; 0: each in its own')
     parser.add_argument('--seconds', type=float, default=60.0, help='length of the run [s]')
     with tempfile.TemporaryDirectory() as folder:
         measure(parser.parse_args(), Path(folder))

@@ -97,6 +97,29 @@ def test_ros2_run_hands_over_arguments_and_exit_code():
     assert done.stdout.strip().endswith('/lib/damadics_fd/detector --help -x a b')
 
 
+def installed() -> list[str]:
+    return [f'{path.parent.name} {path.name}'
+            for path in sorted((ROOT / 'ros2_ws' / 'install').glob('*/lib/damadics_*/*'))]
+
+
+@pytest.mark.parametrize('command', installed())
+def test_every_command_explains_itself_with_an_example(command):
+    done = sourced(f'ros2 run {command} --help')
+    assert done.returncode == 0, done.stderr
+    assert f'ros2 run {command}' in done.stdout
+    assert done.stderr == ''
+
+
+@pytest.mark.parametrize('command', [
+    'damadics_fd estimator', 'damadics_fd detector', 'damadics_plant plant',
+    'damadics_fd monitors estimator -- plant --ros-args',
+])
+def test_a_node_refuses_words_that_it_would_not_see(command):
+    done = sourced(f'timeout 30 ros2 run {command} mode:=paper')
+    assert done.returncode == 2
+    assert done.stderr.splitlines()[-1].startswith(f'{command.split()[1]}: error: ')
+
+
 def test_real_ros2_wins(tmp_path):
     real = tmp_path / 'ros2'
     real.write_text('#!/bin/sh\necho the real one\n')

@@ -1,6 +1,6 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Several valves side by side, on the page that people look at: each has its own state."""
+"""Several valves in two processes, on the page that people look at: each has its own state."""
 
 import os
 import signal
@@ -49,7 +49,7 @@ def fleet(tmp_path_factory):
               website.browser() as chromium):
             processes.forget('PYTEST_CURRENT_TEST')  # the page is to run as it does elsewhere
             processes.start('damadics_bringup', 'run', [
-                str(path), '--simulate', '--dashboard', '--port', str(port),
+                str(path), '--simulate', '--dashboard', '--port', str(port), '--processes', '2',
                 '--logs', str(folder / 'logs')])
             address = f'http://127.0.0.1:{port}'
             website.wait_until_served(address)
@@ -90,6 +90,11 @@ def test_every_valve_has_its_own_state(fleet):
               if valve not in (FAULTY, SHELVED, SLOW)}
     assert set(others.values()) == {'ok'}, others
     assert not any(flag.fault for v in VALVES if v != FAULTY for flag in fleet.flags[v])
+
+
+def test_two_processes_monitor_all_valves(fleet):
+    ran = sorted(child.name for child in children(fleet.run) if child.name != 'plant')
+    assert ran == ['dashboard', 'monitors', 'monitors']
 
 
 def test_silence_greys_every_tile_and_ends_without_an_alarm(fleet):

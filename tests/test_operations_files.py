@@ -16,8 +16,9 @@ from types import ModuleType, SimpleNamespace
 import pytest
 import yaml
 from ament_index_python.packages import get_package_share_directory
-from damadics_bringup.fleet import FleetError, read_fleet
+from damadics_bringup.fleet import FleetError, Valve, read_fleet
 from damadics_bringup.launcher import tasks_of
+from damadics_bringup.policy import policy
 from damadics_bringup.processes import executable, parameters
 from damadics_msgs import msg
 
@@ -81,17 +82,36 @@ def test_a_launch_file_starts_what_there_is(path, monkeypatch):
     assert used == declared
 
 
-def test_the_fleet_launch_file_and_the_run_command_start_the_same(monkeypatch):
+@pytest.mark.parametrize('processes', [0, 2])
+def test_the_fleet_launch_file_and_the_run_command_start_the_same(processes, monkeypatch):
     valves = read_fleet(SHARE / 'config' / 'fleet.yaml')
+    path = SHARE / 'launch' / 'fleet.launch.py'
     launched = [
-        (node.namespace, node.package, node.executable)
-        for node in described(SHARE / 'launch' / 'fleet.launch.py', monkeypatch)
-        if node.kind == 'Node' and hasattr(node, 'namespace')
+        (getattr(node, 'namespace', ''), node.executable,
+         node.arguments if node.executable == 'monitors' else [])
+        for node in described(path, monkeypatch, processes=str(processes))
+        if node.kind == 'Node' and node.executable not in ('recorder', 'dashboard')
     ]
-    options = argparse.Namespace(record=None, dashboard=False, simulate=True)
-    ran = [(t.label.split('/')[0], t.package, t.executable) for t in tasks_of(valves, options)]
+    options = argparse.Namespace(record=None, dashboard=False, simulate=True, processes=processes)
+    ran = [
+        (task.label.rpartition('/')[0], task.executable,
+         task.arguments if task.executable == 'monitors' else [])
+        for task in tasks_of(valves, options)
+    ]
     assert sorted(launched) == sorted(ran)
-    assert len(ran) == 3 * len(valves)
+    assert len(ran) == len(valves) + (processes or 2 * len(valves))
+
+
+def test_nodes_of_one_process_share_its_enclave():
+    valves = [Valve('lv1'), Valve('lv2'), Valve('lv3')]
+    enclaves = {
+        enclave.get('path'): {(p.get('ns'), p.get('node')) for p in enclave.iter('profile')}
+        for enclave in policy(valves, processes=2).getroot().iter('enclave')
+    }
+    assert enclaves['/monitors_1'] == {
+        (f'/{valve}', node) for valve in ('lv1', 'lv3') for node in ('estimator', 'detector')}
+    assert enclaves['/lv1/driver'] == {('/lv1', 'driver')}
+    assert not {'/lv1/detector', '/lv2/estimator'} & set(enclaves)
 
 
 @pytest.mark.parametrize('name', ['estimator', 'detector'])

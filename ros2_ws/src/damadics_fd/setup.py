@@ -30,6 +30,7 @@ setup(
         'console_scripts': [
             'estimator = damadics_fd.estimator:main',
             'detector = damadics_fd.detector:main',
+            'monitors = damadics_fd.monitors:main',
             'recorder = damadics_fd.recorder:main',
             'evaluate = damadics_fd.evaluate:main',
             'replay = damadics_fd.replay:main',

@@ -14,6 +14,7 @@ NAME = re.compile(r'[a-z][a-z0-9_]*(/[a-z][a-z0-9_]*)*')
 TOPICS = ('measurement', 'fault_state', 'estimate', 'residual', 'threshold', 'fault_flag',
           'fault_event')
 ENTRIES = {'parameters': str, 'settings': dict, 'topics': dict, 'simulate': dict}
+MONITORS = ('estimator', 'detector')  # nodes of every valve
 OF_NODE = {'reference': 'estimator', 'alarm_folder': 'detector'}  # the rest is of both
 
 
@@ -67,6 +68,17 @@ def read_fleet(path: Path | str) -> list[Valve]:
     if problems:
         raise FleetError('\n  '.join([f'{path}:', *problems]))
     return valves
+
+
+def spread(valves: list[Valve], processes: int) -> dict[str, list[Valve]]:
+    """
+    Part a fleet among processes that each run estimators and detectors of several valves.
+
+    :param valves: the fleet.
+    :param processes: how many processes; 0: each node is its own.
+    :return: the valves of each process by its name; none for 0.
+    """
+    return {f'monitors_{n + 1}': valves[n::processes] for n in range(min(processes, len(valves)))}
 
 
 def _valve(path: Path, name: str, entry: Any, problems: list[str]) -> Valve:

@@ -3,6 +3,7 @@
 """Command `run`: what the launch files do, on a machine without ROS 2's launch."""
 
 import argparse
+import os
 import signal
 import sys
 import time
@@ -13,7 +14,7 @@ from typing import Any, NamedTuple
 from ament_index_python.packages import get_package_share_directory
 from damadics_fd.ros.commands import command_parser, state_folder
 
-from damadics_bringup.fleet import FleetError, Valve, read_fleet
+from damadics_bringup.fleet import MONITORS, FleetError, Valve, read_fleet, spread
 from damadics_bringup.processes import ProcessError, Processes, assignments
 
 EXAMPLES = """examples:
@@ -76,13 +77,11 @@ def tasks_of(valves: list[Valve], options: argparse.Namespace) -> list[Task]:
         tasks.append(Task('recorder', 'damadics_fd', 'recorder',
                           ['--all', '--out', str(options.record), *arguments_of(
                               {}, enclave='/recorder')]))
-    for valve in valves:
-        tasks += [
-            Task(f'{valve.name}/{node}', 'damadics_fd', node, arguments_of(
-                valve.settings_of(node), namespace=valve.name, file=valve.parameters,
-                topics=dict(valve.topics), enclave=f'/{valve.name}/{node}'))
-            for node in ('estimator', 'detector')
-        ]
+    tasks += _together(valves, options.processes) if options.processes else [
+        Task(f'{valve.name}/{node}', 'damadics_fd', node,
+             node_arguments(valve, node, f'/{valve.name}/{node}'))
+        for valve in valves for node in MONITORS
+    ]
     if options.dashboard:
         tasks.append(Task('dashboard', 'damadics_dashboard', 'dashboard',
                           ['--port', str(options.port), '--host', options.host]
@@ -98,6 +97,39 @@ def tasks_of(valves: list[Valve], options: argparse.Namespace) -> list[Task]:
             for valve in valves
         ]
     return tasks
+
+
+def node_arguments(valve: Valve, node: str, enclave: str) -> list[str]:
+    """
+    Write the command line of a monitoring node.
+
+    :param valve: what it monitors.
+    :param node: `estimator` or `detector`.
+    :param enclave: of SROS 2.
+    :return: arguments.
+    """
+    return arguments_of(valve.settings_of(node), namespace=valve.name, file=valve.parameters,
+                        topics=dict(valve.topics), enclave=enclave)
+
+
+def arguments_of_all(valves: list[Valve], enclave: str) -> list[str]:
+    """
+    Write the command line of a process that monitors several valves.
+
+    :param valves: what it monitors.
+    :param enclave: of SROS 2.
+    :return: arguments of `monitors`.
+    """
+    words: list[str] = []
+    for valve in valves:
+        for node in MONITORS:
+            words += ['--', node, *node_arguments(valve, node, enclave)]
+    return words[1:]
+
+
+def _together(valves: list[Valve], processes: int) -> list[Task]:
+    return [Task(name, 'damadics_fd', 'monitors', arguments_of_all(group, f'/{name}'))
+            for name, group in spread(valves, processes).items()]
 
 
 class Keeper:
@@ -156,6 +188,9 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument('--host', default='127.0.0.1', help='address of the web page (127.0.0.1)')
     p.add_argument('--port', type=int, default=8080, help='port of the web page (8080)')
     p.add_argument('--record', type=Path, metavar='DIR', help='record all topics into this bag')
+    p.add_argument('--processes', type=int, default=0, metavar='N',
+                   help='run all estimators and detectors in N processes, at most half the cost '
+                   'of one process each (the default)')
     p.add_argument('--logs', type=Path, default=state_folder() / 'logs', metavar='DIR',
                    help='where the output of every process goes (%(default)s)')
     p.add_argument('--for', dest='seconds', type=float, metavar='S', help='end after so long [s]')
@@ -177,12 +212,19 @@ def main(args: Sequence[str] | None = None) -> int:
             signal.signal(number, lambda signum, frame: stop.append(signum))
     share = Path(get_package_share_directory('damadics_bringup'))
     try:
+        if options.processes < 0:
+            raise FleetError('--processes: give a number of processes from 1, such as the cores '
+                             'of this machine')
         valves = read_fleet(options.fleet or share / 'config' / 'demo_valve.yaml')
         tasks = tasks_of(valves, options)
         with Processes(options.logs) as processes:
             keeper = Keeper(processes, tasks)
             print(f'{len(valves)} valve(s): {", ".join(valve.name for valve in valves)}; '
                   f'logs in {options.logs}; Ctrl-C ends all, a second one at once', flush=True)
+            cores = os.cpu_count() or 1
+            if not options.processes and len(valves) > cores:
+                print(f'{2 * len(valves)} processes on {cores} cores: --processes {cores} does '
+                      'it with less', flush=True)
             if options.dashboard:
                 print(f'The dashboard opens at http://{options.host}:{options.port}', flush=True)
             end = time.monotonic() + (options.seconds or 1e9)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from damadics_fd.ros.commands import command_parser
 
-from damadics_bringup.fleet import FleetError, Valve, read_fleet
+from damadics_bringup.fleet import MONITORS, FleetError, Valve, read_fleet, spread
 
 EXAMPLES = """example:
   ros2 run damadics_bringup policy fleet.yaml --out policy.xml
@@ -50,19 +50,25 @@ NODES = {  # of every valve
 PLANT = Rights(('measurement', 'fault_state', '/clock'), (), ('inject_fault',))
 
 
-def policy(valves: Sequence[Valve], simulate: bool = False) -> ET.ElementTree:
+def policy(
+    valves: Sequence[Valve], simulate: bool = False, processes: int = 0,
+) -> ET.ElementTree:
     """
     Write down what each node of a fleet may do.
 
     :param valves: the fleet.
     :param simulate: also for the simulated plants.
+    :param processes: as given to `run`: nodes of one process share its enclave.
     :return: a document of the form that `ros2 security` takes (version 0.2.0).
     """
     root = ET.Element('policy', version='0.2.0')
     enclaves = ET.SubElement(root, 'enclaves')
+    process_of = {valve.name: name for name, group in spread(list(valves), processes).items()
+                  for valve in group}
     for valve in valves:
         for node, rights in {**NODES, **({'plant': PLANT} if simulate else {})}.items():
-            _enclave(enclaves, f'/{valve.name}', node, _of_valve(rights, valve))
+            shared = process_of.get(valve.name, '') if node in MONITORS else ''
+            _enclave(enclaves, f'/{valve.name}', node, _of_valve(rights, valve), shared)
     operate = (*OPERATE, 'inject_fault') if simulate else OPERATE
     page = _all(valves, Rights((), SAMPLES, (), operate))
     _enclave(enclaves, '/', 'dashboard', Rights(
@@ -93,9 +99,13 @@ def _all(valves: Iterable[Valve], rights: Rights) -> Rights:
                   request=[name for one in each for name in one.request])
 
 
-def _enclave(enclaves: ET.Element, namespace: str, node: str, rights: Rights) -> None:
-    path = f'{namespace.rstrip("/")}/{node}'
-    profiles = ET.SubElement(ET.SubElement(enclaves, 'enclave', path=path), 'profiles')
+def _enclave(enclaves: ET.Element, namespace: str, node: str, rights: Rights,
+             shared: str = '') -> None:
+    """Add a node's profile to its own enclave, or to the one of its process."""
+    path = f'/{shared}' if shared else f'{namespace.rstrip("/")}/{node}'
+    profiles = enclaves.find(f"enclave[@path='{path}']/profiles")
+    if profiles is None:
+        profiles = ET.SubElement(ET.SubElement(enclaves, 'enclave', path=path), 'profiles')
     profile = ET.SubElement(profiles, 'profile', ns=namespace, node=node)
     for kind, verb, names in (
         ('topic', 'subscribe', (*rights.subscribe, '/clock')),
@@ -119,6 +129,7 @@ def parser() -> argparse.ArgumentParser:
                        EXAMPLES)
     p.add_argument('fleet', type=Path, help='list of the valves (YAML)')
     p.add_argument('--simulate', action='store_true', help='also for the simulated plants')
+    p.add_argument('--processes', type=int, default=0, metavar='N', help='as given to run')
     p.add_argument('--out', type=Path, metavar='FILE', help='write it here (standard output)')
     return p
 
@@ -132,7 +143,7 @@ def main(args: Sequence[str] | None = None) -> int:
     """
     options = parser().parse_args(args)
     try:
-        tree = policy(read_fleet(options.fleet), options.simulate)
+        tree = policy(read_fleet(options.fleet), options.simulate, options.processes)
         text = ET.tostring(tree.getroot(), encoding='unicode', xml_declaration=True) + '\n'
         if options.out:
             options.out.write_text(text)

@@ -5,7 +5,8 @@
 from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
-from damadics_bringup.fleet import read_fleet
+from damadics_bringup.fleet import MONITORS, read_fleet, spread
+from damadics_bringup.launcher import arguments_of_all
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.conditions import IfCondition
@@ -17,8 +18,14 @@ CONFIG = Path(get_package_share_directory('damadics_bringup'), 'config')
 
 def valves(context):
     """Describe the nodes of every valve in the list."""
-    actions = []
-    for valve in read_fleet(LaunchConfiguration('fleet').perform(context)):
+    fleet = read_fleet(LaunchConfiguration('fleet').perform(context))
+    together = spread(fleet, int(LaunchConfiguration('processes').perform(context)))
+    actions = [
+        Node(package='damadics_fd', executable='monitors', respawn=True, respawn_delay=1.0,
+             arguments=arguments_of_all(group, f'/{name}'), output='screen')
+        for name, group in together.items()
+    ]
+    for valve in fleet:
         file = [str(valve.parameters)] if valve.parameters else []
         topics = list(valve.topics.items())
         actions += [
@@ -26,7 +33,7 @@ def valves(context):
                  parameters=[*file, valve.settings_of(node)], remappings=topics,
                  ros_arguments=['--enclave', f'/{valve.name}/{node}'],
                  respawn=True, respawn_delay=1.0, output='screen')
-            for node in ('estimator', 'detector')
+            for node in MONITORS if not together
         ]
         actions.append(
             Node(package='damadics_plant', executable='plant', namespace=valve.name,
@@ -45,6 +52,8 @@ def generate_launch_description():
     return LaunchDescription([
         DeclareLaunchArgument('fleet', default_value=str(CONFIG / 'fleet.yaml'),
                               description='list of the valves'),
+        DeclareLaunchArgument('processes', default_value='0', description='run all estimators '
+                              'and detectors in so many processes; 0: each in its own'),
         DeclareLaunchArgument('simulate', default_value='false',
                               description='start a simulated plant for each valve'),
         DeclareLaunchArgument('dashboard', default_value='false', description='start the page'),

@@ -18,6 +18,7 @@ from damadics_fd.core.estimator import Estimate
 from damadics_fd.core.modes import PHASE_INIT, PHASE_MONITOR
 from damadics_fd.ros import qos
 from damadics_fd.ros.alarm_store import AlarmStore, another_run, default_folder
+from damadics_fd.ros.commands import check_node_arguments
 from damadics_fd.ros.conversions import event_message, read_estimate, write_flag
 from damadics_fd.ros.diagnostics import Level, Report
 from damadics_fd.ros.managed import MonitoringNode
@@ -26,6 +27,11 @@ from damadics_fd.ros.rival import RivalWatch
 from damadics_fd.ros.signature import SignaturePublisher, read_causes
 from damadics_fd.ros.spin import spin
 
+DESCRIPTION = 'Judge the estimates of one valve: residual against threshold, fault flag, cause.'
+EXAMPLES = """examples:
+  ros2 run damadics_fd detector
+  ros2 run damadics_fd detector --ros-args -p mode:=paper
+  ros2 run damadics_fd detector --ros-args -r __ns:=/lv101 --params-file valve.param.yaml"""
 HEARTBEAT = 1.0  # s of wall time
 START_ESTIMATOR = 'start the estimator: ros2 run damadics_fd estimator'
 READY = Estimate._make([1] + [0.0] * 14 + [0])  # an estimate that makes the core compile
@@ -34,8 +40,8 @@ READY = Estimate._make([1] + [0.0] * 14 + [0])  # an estimate that makes the cor
 class DetectorNode(MonitoringNode):
     """Judge each estimate; publish residual, threshold and what changes; serve operators."""
 
-    def __init__(self) -> None:
-        super().__init__('detector', 'estimate', START_ESTIMATOR)
+    def __init__(self, arguments: list[str] | None = None) -> None:
+        super().__init__('detector', 'estimate', START_ESTIMATOR, arguments)
         Detector(self.settings).update(READY)
         self._core = Detector(self.settings)
         self._decision: Decision | None = None
@@ -204,6 +210,7 @@ class DetectorNode(MonitoringNode):
 
 def main(args: list[str] | None = None) -> int:
     """Run the node."""
+    check_node_arguments('detector', DESCRIPTION, EXAMPLES, args)
     return spin(DetectorNode, args)
 
 

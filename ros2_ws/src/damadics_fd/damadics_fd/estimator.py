@@ -19,12 +19,18 @@ from damadics_fd.core.quality import EXPLANATIONS
 from damadics_fd.core.scada.estimator import estimator_for
 from damadics_fd.reference import Reference, ReferenceFileError, load_reference, save_reference
 from damadics_fd.ros import qos
+from damadics_fd.ros.commands import check_node_arguments
 from damadics_fd.ros.conversions import sample, write_estimate
 from damadics_fd.ros.diagnostics import Level, Report
 from damadics_fd.ros.managed import MonitoringNode
 from damadics_fd.ros.operator import signed
 from damadics_fd.ros.spin import spin
 
+DESCRIPTION = 'Estimate velocity and residual of one valve with the on-line approximator.'
+EXAMPLES = """examples:
+  ros2 run damadics_fd estimator
+  ros2 run damadics_fd estimator --ros-args -p mode:=paper
+  ros2 run damadics_fd estimator --ros-args -r __ns:=/lv101 --params-file valve.param.yaml"""
 START_PLANT = 'start a driver of the valve, or the simulator: ros2 run damadics_plant plant'
 READY = (1, 0.5, 0.5, 0.0, 0.0, 20.0, 0.0, 0.0)  # a sample that makes the core compile
 MONITORING = ('monitor', 'paper')  # phases in which decisions count
@@ -34,8 +40,8 @@ RECENT = 1.5  # s of wall time for which a refused sample is told
 class EstimatorNode(MonitoringNode):
     """Turn each measurement into an estimate; report what was refused; keep what was learned."""
 
-    def __init__(self) -> None:
-        super().__init__('estimator', 'measurement', START_PLANT)
+    def __init__(self, arguments: list[str] | None = None) -> None:
+        super().__init__('estimator', 'measurement', START_PLANT, arguments)
         estimator_for(self.settings).update(*READY)
         self._core = estimator_for(self.settings)
         self._message = EstimateMessage()
@@ -157,6 +163,7 @@ class EstimatorNode(MonitoringNode):
 
 def main(args: list[str] | None = None) -> int:
     """Run the node."""
+    check_node_arguments('estimator', DESCRIPTION, EXAMPLES, args)
     return spin(EstimatorNode, args)
 
 

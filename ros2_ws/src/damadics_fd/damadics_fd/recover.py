@@ -2,23 +2,25 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command recover: save every intact message of a damaged bag."""
 
-import argparse
 import sys
 from pathlib import Path
 
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.inspection import UNUSABLE
 from damadics_fd.bag.salvage import salvage
+from damadics_fd.ros.commands import command_parser
 from damadics_fd.verify import print_report
+
+EXAMPLE = """exit code: 0 nothing was lost, 3 something was, 1 nothing can be saved
+
+example:
+  ros2 run damadics_fd recover bags/broken --out bags/saved"""
 
 
 def main(args: list[str] | None = None) -> int:
     """Run the command."""
-    parser = argparse.ArgumentParser(
-        prog='recover', description='Copy every intact message of a damaged bag to a new one.',
-        epilog='exit code: 0 nothing was lost, 3 something was, 1 nothing can be saved.'
-        ' example: ros2 run damadics_fd recover bags/broken --out bags/saved',
-    )
+    parser = command_parser('recover', 'Copy every intact message of a damaged bag to a new one.',
+                            EXAMPLE)
     parser.add_argument('bag', type=Path, metavar='BAG', help='MCAP file or bag directory')
     parser.add_argument('--out', type=Path, required=True, metavar='BAG',
                         help='file to write, a directory where BAG is one')

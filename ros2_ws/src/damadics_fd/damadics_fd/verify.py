@@ -2,14 +2,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command verify: what a bag holds, and whether it is whole."""
 
-import argparse
 import sys
 from pathlib import Path
 
 from damadics_fd.bag.inspection import LOSSY, UNUSABLE, WHOLE, Report, inspect
+from damadics_fd.ros.commands import command_parser
 
 VERDICTS = {WHOLE: 'whole', LOSSY: 'lossy', UNUSABLE: 'unusable'}
 SHOWN = 10  # problems told one by one
+EXAMPLE = """exit code: 0 whole, 3 lossy, 1 unusable (the worst of all bags)
+
+example:
+  ros2 run damadics_fd verify bags/friction"""
 
 
 def print_report(report: Report) -> None:
@@ -35,11 +39,7 @@ def print_report(report: Report) -> None:
 
 def main(args: list[str] | None = None) -> int:
     """Run the command."""
-    parser = argparse.ArgumentParser(
-        prog='verify', description='Tell what bags hold and whether they are whole.',
-        epilog='exit code: 0 whole, 3 lossy, 1 unusable (the worst of all bags).'
-        ' example: ros2 run damadics_fd verify bags/friction',
-    )
+    parser = command_parser('verify', 'Tell what bags hold and whether they are whole.', EXAMPLE)
     parser.add_argument('bags', nargs='+', type=Path, metavar='BAG',
                         help='MCAP file or bag directory')
     options = parser.parse_args(args)

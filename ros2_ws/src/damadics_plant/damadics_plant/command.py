@@ -25,11 +25,13 @@ from damadics_plant.simulator import MODELS
 
 _EXAMPLE = """\
 examples:
-  simulate --list
-  simulate paper_friction --out friction.mcap
-  simulate --fault f11 --strength 0.5 --from 900 --noise --seed 3 --out spring.csv
-  simulate nominal --cv 'plant.csv:LC74_20CV*0.01' --duration 3600 --rate 1 --out replayed.csv
-  simulate all44 --rate 1 --out scenarios/
+  ros2 run damadics_plant simulate --list
+  ros2 run damadics_plant simulate paper_friction --out friction.mcap
+  ros2 run damadics_plant simulate --fault f11 --strength 0.5 --from 900 --noise --seed 3 \\
+      --out spring.csv
+  ros2 run damadics_plant simulate nominal --cv 'plant.csv:LC74_20CV*0.01' --duration 3600 \\
+      --rate 1 --out replayed.csv
+  ros2 run damadics_plant simulate all44 --rate 1 --out scenarios/
 """
 _INTERRUPTED = 130
 

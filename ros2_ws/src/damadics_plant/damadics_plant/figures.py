@@ -133,7 +133,7 @@ def main(args: Sequence[str] | None = None) -> int:
     :return: exit code.
     """
     p = argparse.ArgumentParser(prog='figures', description=__doc__,
-                                epilog='example: figures --out docs')
+                                epilog='example: ros2 run damadics_plant figures --out doc')
     p.add_argument('--out', type=Path, default=Path(), metavar='FOLDER')
     out = p.parse_args(args).out
     try:

@@ -4,10 +4,14 @@
 
 import sys
 import time
+from collections import deque
 from typing import Any
 
 import rclpy
+from builtin_interfaces.msg import Time
+from damadics_fd.bag.cdr import stamped_encoder
 from damadics_fd.ros import qos
+from damadics_fd.ros.commands import check_node_arguments
 from damadics_fd.ros.parameters import Parameters
 from damadics_fd.ros.spin import spin
 from damadics_msgs.msg import FaultState, Measurement
@@ -18,10 +22,22 @@ from rosgraph_msgs.msg import Clock as ClockMessage
 
 from damadics_plant import Simulator
 
+DESCRIPTION = 'Simulate the actuator and publish its signals and its faults at the sample rate.'
+EXAMPLES = """examples:
+  ros2 run damadics_plant plant
+  ros2 run damadics_plant plant --ros-args -p scenario:=paper_friction -p real_time_factor:=10.0
+  ros2 run damadics_plant plant --ros-args -p model:=lugre -p rate:=200.0 -p noise:=true
+  ros2 run damadics_plant simulate --list        all scenarios"""
 MODELS = ('dablib', 'lugre')
-TICK = 0.002  # s of wall time between two looks at what is due
+TICKS = (0.002, 0.01)  # s of wall time between two looks at what is due: least, greatest
+LEAD = 0.25  # ticks that a sample is due before the look that sends it: none waits for the next
 LARGEST_BURST = 200  # samples of one tick: the executor must come to its other work
 SETTLE = 0.5  # s from the last awaited subscriber to the first sample, for the other topics
+AHEAD = 0.05  # s of wall time that is simulated at once; an injected fault begins after it
+MESSAGES = {
+    'damadics_msgs/msg/FaultState': ('fault', 'strength'),
+    'damadics_msgs/msg/Measurement': ('cv', 'x1', 'p1', 'p2', 't1', 'flow', 'ps'),
+}
 PATIENCE = 0.5  # s of wall time behind which the pace is given up
 
 
@@ -71,7 +87,13 @@ class Plant(Node):
         self._rate = rate
         self._sent = 0
         self._began = 0.0
-        self.create_timer(TICK, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        pace = rate * self._factor  # samples per second of wall time
+        self._tick_length = min(max(TICKS[0], 1.0 / pace), TICKS[1]) if pace else TICKS[0]
+        self._block = min(max(1, int(pace * AHEAD)), LARGEST_BURST)
+        self._ahead: deque[tuple[int, bytes, bytes]] = deque()
+        self._simulate(self._block)  # before the clock runs: the first block loads compiled code
+        self.create_timer(
+            self._tick_length, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self.get_logger().info(
             f'{scenario}, model {model}, {rate:g} Hz, real-time factor {self._factor:g}'
         )
@@ -84,7 +106,8 @@ class Plant(Node):
         if not self._began:
             if self._measurement.get_subscription_count() < self._awaited:
                 return
-            self._began = now + (SETTLE if self._awaited else 0.0)
+            settle = round(SETTLE / self._tick_length) if self._awaited else 0
+            self._began = now + (settle - LEAD) * self._tick_length
         if now < self._began:
             return
         due = LARGEST_BURST
@@ -99,12 +122,12 @@ class Plant(Node):
                 )
         if due > 0:
             self._publish(min(due, LARGEST_BURST))
-        if self._simulator.finished:
+        if self._simulator.finished and not self._ahead:
             self.get_logger().info(f'scenario ended after {self._sent} samples')
             self.finished = True
 
     def _inject(self, request: Any, response: Any) -> Any:
-        """Begin a fault with the next sample, or clear all."""
+        """Begin a fault with the next sample that is not yet simulated, or clear all."""
         try:
             if request.fault == FaultState.NONE:
                 self._simulator.clear()
@@ -119,25 +142,28 @@ class Plant(Node):
         return response
 
     def _publish(self, count: int) -> None:
-        columns = self._simulator.advance(count)
-        names = ('cv', 'x1', 'p1', 'p2', 't1', 'flow', 'ps')
-        signals = [columns[name].tolist() for name in names]
-        truth = zip(columns['fault'].tolist(), columns['strength'].tolist(), strict=True)
-        measurement, fault_state = Measurement(), FaultState()
-        measurement.header.frame_id = fault_state.header.frame_id = self._frame_id
-        for stamp, values, (fault, strength) in zip(
-            columns['stamp'].tolist(), zip(*signals, strict=True), truth, strict=True
-        ):
-            for header in (measurement.header, fault_state.header):
-                header.stamp.sec, header.stamp.nanosec = divmod(stamp, 1_000_000_000)
-            for name, value in zip(names, values, strict=True):
-                setattr(measurement, name, value)
-            fault_state.fault, fault_state.strength = fault, strength
+        for _ in range(count):
+            if not self._ahead:
+                if self._simulator.finished:
+                    return
+                self._simulate(max(count, self._block))
+            stamp, fault_state, measurement = self._ahead.popleft()
             if self._clock_topic:
-                self._clock_topic.publish(ClockMessage(clock=measurement.header.stamp))
+                sec, nanosec = divmod(stamp, 1_000_000_000)
+                self._clock_topic.publish(ClockMessage(clock=Time(sec=sec, nanosec=nanosec)))
             self._fault_state.publish(fault_state)
             self._measurement.publish(measurement)
-        self._sent += len(signals[0])
+            self._sent += 1
+
+    def _simulate(self, count: int) -> None:
+        """Have the next samples ready, serialised: many at once cost little more than one."""
+        columns = self._simulator.advance(count)
+        stamp = columns['stamp']
+        rows = [
+            stamped_encoder(kind, self._frame_id)({name: columns[name] for name in names}, stamp)
+            for kind, names in MESSAGES.items()
+        ]
+        self._ahead.extend(zip(stamp.tolist(), *(map(bytes, row) for row in rows), strict=True))
 
     def destroy_node(self) -> None:
         """Let subscribers take the end of a scenario, then go."""
@@ -148,6 +174,7 @@ class Plant(Node):
 
 def main(args: list[str] | None = None) -> int:
     """Run the node."""
+    check_node_arguments('plant', DESCRIPTION, EXAMPLES, args)
     return spin(Plant, args)
 
 

@@ -14,12 +14,13 @@ aligned to its own size counted from the end of that header.
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from damadics_fd.bag.definition import PRIMITIVES, Definition
+from damadics_fd.bag.definition import PRIMITIVES, Definition, parse_definition, schema_text
 from damadics_fd.bag.errors import BagError
 
 HEADER = b'\x00\x01\x00\x00'  # plain CDR, little endian
@@ -27,6 +28,7 @@ HEADER_SIZE = len(HEADER)
 MOST_ELEMENTS = 1 << 16  # places walked in one message; longer ones are no columns
 TIME = 'builtin_interfaces/msg/Time'
 DURATION = 'builtin_interfaces/msg/Duration'
+NANO = 1_000_000_000
 
 
 class Place(NamedTuple):
@@ -184,33 +186,57 @@ def layout_of(definition: Definition, kind: str, message: bytes) -> Layout:
     return walk.layout()
 
 
-def encode_columns(
-    definition: Definition, kind: str, columns: Mapping[str, NDArray], texts: Mapping[str, str]
-) -> NDArray:
+class Encoder:
     """
-    Serialise columns to messages of fixed size.
+    Serialises columns to stamped messages of fixed size.
 
     :param definition: types as `parse_definition` returns them.
     :param kind: type of the messages.
-    :param columns: values by dotted field name, n of each.
     :param texts: the constant value of each string field, empty if absent.
-    :return: n messages as a structured array, whose bytes are the messages one after the other.
-    :raises BagError: where the type has sequences or a column is no field.
+    :raises BagError: where the type has sequences.
     """
-    walk = _Walk(definition, b'', texts)
-    walk.walk(kind)
-    layout = walk.layout()
-    dtype = layout.dtype()
-    count = len(next(iter(columns.values())))
-    data = np.zeros((count, layout.size), np.uint8)
-    data[:, :HEADER_SIZE] = np.frombuffer(HEADER, np.uint8)
-    for offset, length in layout.lengths:
-        data[:, offset:offset + 4] = np.frombuffer(struct.pack('<I', length), np.uint8)
-    messages: NDArray = data.view(dtype)[:, 0]
-    for name, text in texts.items():
-        messages[name] = text.encode()
-    for name, values in columns.items():
-        if name not in (dtype.names or ()):
-            raise BagError(f'{kind} has no field {name}')
-        messages[name] = values
-    return messages
+
+    def __init__(self, definition: Definition, kind: str, texts: Mapping[str, str]):
+        walk = _Walk(definition, b'', texts)
+        walk.walk(kind)
+        self._kind = kind
+        layout = walk.layout()
+        self._dtype = layout.dtype()
+        self._constant = np.zeros((1, layout.size), np.uint8)
+        self._constant[0, :HEADER_SIZE] = list(HEADER)
+        for offset, length in layout.lengths:
+            self._constant[0, offset:offset + 4] = list(struct.pack('<I', length))
+        for name, text in texts.items():
+            self._constant.view(self._dtype)[name] = text.encode()
+
+    def __call__(self, columns: Mapping[str, NDArray], stamp: NDArray[np.int64]) -> NDArray:
+        """
+        Serialise columns.
+
+        :param columns: values by dotted field name, n of each.
+        :param stamp: n values of `header.stamp` [ns].
+        :return: n messages as a structured array, whose bytes are the messages one after the
+            other.
+        :raises BagError: where a column is no field.
+        """
+        messages: NDArray = np.repeat(self._constant, len(stamp), axis=0).view(self._dtype)[:, 0]
+        header = {'header.stamp.sec': stamp // NANO, 'header.stamp.nanosec': stamp % NANO}
+        for name, values in {**header, **columns}.items():
+            if name not in (self._dtype.names or ()):
+                raise BagError(f'{self._kind} has no field {name}')
+            messages[name] = values
+        return messages
+
+
+@lru_cache(maxsize=64)
+def stamped_encoder(kind: str, frame_id: str) -> Encoder:
+    """
+    Return the encoder of an installed type of messages with a header.
+
+    :param kind: `package/msg/Type`.
+    :param frame_id: `header.frame_id` of all messages.
+    :return: the encoder.
+    :raises BagError: where the type is not installed or has sequences.
+    """
+    definition = parse_definition(kind, schema_text(kind))
+    return Encoder(definition, kind, {'header.frame_id': frame_id})

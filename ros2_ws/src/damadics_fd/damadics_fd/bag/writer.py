@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from damadics_fd.bag.cdr import encode_columns
-from damadics_fd.bag.definition import parse_definition, schema_text, type_hash
+from damadics_fd.bag.cdr import stamped_encoder
+from damadics_fd.bag.definition import schema_text, type_hash
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.mcap_writer import CHUNK_SIZE, LEVEL, McapWriter
 from damadics_fd.bag.rosbag2 import (
@@ -209,15 +209,11 @@ class BagWriter:
         """
         if not len(stamp):
             return
-        header = {'header.stamp.sec': stamp // NANO, 'header.stamp.nanosec': stamp % NANO}
         channels = []
         payloads = []
         for name, columns in messages.items():
             topic = self._topics[name]
-            definition = parse_definition(topic.type, schema_text(topic.type))
-            payloads.append(encode_columns(
-                definition, topic.type, {**header, **columns}, {'header.frame_id': frame_id}
-            ))
+            payloads.append(stamped_encoder(topic.type, frame_id)(columns, stamp))
             channels.append(self._channel(topic))
             self._note(topic, int(stamp[0]), int(stamp[-1]), len(stamp))
         self._mcap.add_rows(channels, stamp, payloads)

@@ -15,13 +15,19 @@ from damadics_fd.evaluate.trajectories import CACHE_VARIABLE, SCENARIOS
 
 EXAMPLES = f"""\
 examples:
-  evaluate run --out results                     44 scenarios, all detectors, one seed
-  evaluate run --out results --seeds 20 --nominal-days 40     more of it; what is there is kept
-  evaluate run --out results --scenarios f4_I f11_B f12@-0.37 --detectors scada cusum
-  evaluate run --out results --scheduler tcp://head:8786      on a Dask cluster
-  evaluate paper results                         the paper's two experiments, all detectors
-  evaluate report results                        index.html, summary.csv, README.md in there
-  evaluate compare before after                  what a change did, per scenario and detector
+  44 scenarios, all detectors, one seed:
+    ros2 run damadics_fd evaluate run --out results
+  more of it; what is there is kept:
+    ros2 run damadics_fd evaluate run --out results --seeds 20 --nominal-days 40
+  some of it, a strength of your own; on a Dask cluster:
+    ros2 run damadics_fd evaluate run --out results --scenarios f4_I f12@-0.37 --detectors scada
+    ros2 run damadics_fd evaluate run --out results --scheduler tcp://head:8786
+  the paper's two experiments, all detectors:
+    ros2 run damadics_fd evaluate paper results
+  index.html, summary.csv and README.md:
+    ros2 run damadics_fd evaluate report results
+  what a change did, per scenario and detector:
+    ros2 run damadics_fd evaluate compare before after
 
 Plant trajectories are kept in ${CACHE_VARIABLE}, by default ~/.cache/damadics_fd."""
 

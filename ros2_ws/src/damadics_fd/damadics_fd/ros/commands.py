@@ -8,6 +8,12 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+NODE_HELP = """
+
+while it runs, its parameters:
+  ros2 param list /{node}
+  ros2 param describe /{node} PARAMETER"""
+
 
 def state_folder() -> Path:
     """
@@ -32,6 +38,23 @@ def command_parser(name: str, description: str, examples: str) -> argparse.Argum
         prog=name, description=description, epilog=examples,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+
+
+def check_node_arguments(
+    name: str, description: str, examples: str, args: Sequence[str] | None,
+) -> None:
+    """
+    Answer `--help` of a node and refuse words that it would not see.
+
+    :param name: of the node.
+    :param description: one sentence.
+    :param examples: shown below, line by line as written.
+    :param args: command line, `sys.argv` by default; what follows `--ros-args` is not looked at.
+    :raises SystemExit: after the help, or with code 2.
+    """
+    p = command_parser(name, description, examples + NODE_HELP.format(node=name))
+    p.usage = f'{name} [-h] [--ros-args -p NAME:=VALUE --params-file FILE -r __ns:=/NAMESPACE ...]'
+    p.parse_args(split_ros_args(args)[0])
 
 
 def split_ros_args(args: Sequence[str] | None) -> tuple[list[str], list[str]]:

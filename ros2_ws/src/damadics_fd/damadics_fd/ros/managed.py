@@ -24,10 +24,12 @@ class MonitoringNode(LifecycleNode, ABC):
     :param name: of the node.
     :param topic: of its input.
     :param command: that starts the publisher of the input.
+    :param arguments: ROS arguments of this node alone; those of the process by default.
     """
 
-    def __init__(self, name: str, topic: str, command: str) -> None:
-        super().__init__(name)
+    def __init__(self, name: str, topic: str, command: str,
+                 arguments: list[str] | None = None) -> None:
+        super().__init__(name, cli_args=arguments, use_global_arguments=arguments is None)
         self.finished = False
         self.exit_code = 0
         self.active = False

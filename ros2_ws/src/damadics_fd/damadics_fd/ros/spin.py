@@ -1,11 +1,11 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Start a node, spin it until it has finished or a signal comes, and end it cleanly."""
+"""Start nodes, spin them until they have finished or a signal comes, and end them cleanly."""
 
 import gc
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import rclpy
@@ -39,13 +39,26 @@ def spin(make_node: Callable[[], SpinnableNode], args: list[str] | None = None) 
     :return: the exit code: 0 after SIGINT, SIGTERM or the end of the node's work, 1 where the
         node did not start, or what the node gives.
     """
+    return spin_all([make_node], args)
+
+
+def spin_all(makers: Sequence[Callable[[], SpinnableNode]], args: list[str] | None = None) -> int:
+    """
+    Run nodes together in one process, until the last has finished.
+
+    :param makers: each makes a node; may raise `StartError`, then none runs.
+    :param args: command line, `sys.argv` by default.
+    :return: the exit code as of `spin`, the largest of the nodes.
+    """
     stop: list[int] = []
-    node = None
+    nodes: list[SpinnableNode] = []
+    ready = False
+    exit_code = 0
 
     def end(number: int, frame: object) -> None:
         stop.append(number)
-        if node is None and len(stop) == 1:
-            raise KeyboardInterrupt  # it may take a while to make the node
+        if not ready and len(stop) == 1:
+            raise KeyboardInterrupt  # it may take a while to make the nodes
 
     # Not the handlers of rclpy: they end the context at the first signal and give the second one
     # to Python, whose KeyboardInterrupt aborts the process in the executor's C++. Launch sends
@@ -54,14 +67,21 @@ def spin(make_node: Callable[[], SpinnableNode], args: list[str] | None = None) 
         signal.signal(number, end)
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-        node = make_node()
         executor = EventsExecutor()
-        executor.add_node(node)
+        for make_node in makers:
+            nodes.append(make_node())
+            executor.add_node(nodes[-1])
+        ready = True
         # Never untimed: an untimed spin of this executor does not return in some builds. Many
         # callbacks a call, where spin_once returns after each.
         never: Future = Future()
-        while not (stop or node.finished):
+        while nodes and not stop:
             executor.spin_until_future_complete(never, SLICE)
+            for node in [node for node in nodes if node.finished]:
+                exit_code = max(exit_code, node.exit_code)
+                nodes.remove(node)
+                executor.remove_node(node)
+                node.destroy_node()
     except StartError as problem:
         print(problem, file=sys.stderr)
         return 1
@@ -70,10 +90,10 @@ def spin(make_node: Callable[[], SpinnableNode], args: list[str] | None = None) 
     finally:
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, signal.SIG_IGN)  # it is ending already
-        if node is not None:
+        for node in nodes:
             node.destroy_node()
         rclpy.try_shutdown()
         # Leave nothing to the interpreter's last collections: they cost 0.35 s of CPU time, which
         # a fleet of many nodes would wait for when it ends.
         gc.freeze()
-    return node.exit_code
+    return max([exit_code, *(node.exit_code for node in nodes)])
