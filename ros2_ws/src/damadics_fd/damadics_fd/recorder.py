@@ -18,6 +18,7 @@ from damadics_fd.bag.blackbox import BlackBox
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.spool import Spool
 from damadics_fd.bag.writer import BagWriter
+from damadics_fd.ros.clock_step import timers_kept_going
 from damadics_fd.ros.recording import Recorder
 
 SLICE = 0.02  # [s] between two looks at the signals
@@ -102,10 +103,11 @@ def _spin(node: Recorder, spool: Spool, stop: list[int]) -> None:
     executor = EventsExecutor()
     executor.add_node(node)
     never: Future = Future()
-    while not stop:
-        # takes many messages per call, where spin_once() returns after each; timed, because
-        # untimed waiting is broken in the wheels
-        executor.spin_until_future_complete(never, SLICE)
+    with timers_kept_going([node]):
+        while not stop:
+            # takes many messages per call, where spin_once() returns after each; timed, because
+            # untimed waiting is broken in the wheels
+            executor.spin_until_future_complete(never, SLICE)
     end = time.monotonic() + LAST_WAIT
     received = -1
     while received != spool.received and time.monotonic() < end:

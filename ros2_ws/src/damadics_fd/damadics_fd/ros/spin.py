@@ -13,6 +13,8 @@ from rclpy.experimental import EventsExecutor
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
+from damadics_fd.ros.clock_step import timers_kept_going
+
 SLICE = 0.05  # s between two looks at the signals
 
 
@@ -75,13 +77,14 @@ def spin_all(makers: Sequence[Callable[[], SpinnableNode]], args: list[str] | No
         # Never untimed: an untimed spin of this executor does not return in some builds. Many
         # callbacks a call, where spin_once returns after each.
         never: Future = Future()
-        while nodes and not stop:
-            executor.spin_until_future_complete(never, SLICE)
-            for node in [node for node in nodes if node.finished]:
-                exit_code = max(exit_code, node.exit_code)
-                nodes.remove(node)
-                executor.remove_node(node)
-                node.destroy_node()
+        with timers_kept_going(nodes):
+            while nodes and not stop:
+                executor.spin_until_future_complete(never, SLICE)
+                for node in [node for node in nodes if node.finished]:
+                    exit_code = max(exit_code, node.exit_code)
+                    nodes.remove(node)
+                    executor.remove_node(node)
+                    node.destroy_node()
     except StartError as problem:
         print(problem, file=sys.stderr)
         return 1

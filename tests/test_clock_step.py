@@ -1,0 +1,55 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""The system clock is set back by an hour, as a time server or a person may do."""
+
+import struct
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+from damadics_bringup.processes import Processes, parameters, surroundings
+from damadics_fd.ros import qos
+from damadics_msgs.msg import FaultFlag
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.qos import QoSProfile
+
+pytestmark = pytest.mark.ros
+SOURCE = Path(__file__).with_name('clock_step.c')
+SETTINGS = {'mode': 'paper', 'sample_rate': 100.0}
+PERIOD = 10_000_000  # ns
+HOUR = 3600.0
+
+
+@pytest.fixture
+def stepped(tmp_path, domain):
+    """Processes whose system clock can be set, and how to set it [s]."""
+    library, file = tmp_path / 'clock_step.so', tmp_path / 'step'
+    subprocess.run(['cc', '-O1', '-shared', '-fPIC', '-o', library, SOURCE, '-ldl', '-pthread'],
+                   check=True, timeout=60)
+    file.write_bytes(struct.pack('d', 0.0))
+    preload = {'LD_PRELOAD': str(library), 'CLOCK_STEP_FILE': str(file)}
+    with Processes(tmp_path / 'logs', {**surroundings(domain), **preload}) as processes:
+        yield processes, lambda seconds: file.write_bytes(struct.pack('d', seconds))
+
+
+@pytest.mark.parametrize('step', [-HOUR, HOUR])
+def test_silence_is_noticed_when_the_clock_was_set(stepped, peer, step):
+    processes, set_clock = stepped
+    flags = peer.listen(FaultFlag, 'fault_flag', qos.FLAG)
+    reports = peer.listen(DiagnosticArray, '/diagnostics', QoSProfile(depth=100))
+    processes.start('damadics_fd', 'estimator', parameters(**SETTINGS))
+    processes.start('damadics_fd', 'detector', parameters(alarm_folder='', **SETTINGS))
+    assert peer.wait(lambda: flags and peer.node.count_subscribers('/measurement')
+                     and peer.node.count_publishers('/estimate'), 30.0)
+    for n in range(1, 200):
+        peer.send(n * PERIOD, 0.5, 0.5)
+        peer.wait(lambda: False, PERIOD * 1e-9)
+        if n == 100:
+            set_clock(step)
+    assert flags[-1].state == FaultFlag.STATE_HEALTHY
+    silent = time.monotonic()
+    assert peer.wait(lambda: flags[-1].state == FaultFlag.STATE_NOT_MONITORING, 5.0)
+    assert time.monotonic() - silent < 0.5 + 0.3, 'timeout, and one look'
+    said = len(reports)
+    assert peer.wait(lambda: len(reports) >= said + 4, 4.0), 'both nodes report once a second'
