@@ -22,7 +22,8 @@ EXAMPLES = """examples:
   ros2 run damadics_bringup run fleet.yaml --dashboard     your valves
   ros2 run damadics_bringup run fleet.yaml --record bags/today"""
 LOOK = 0.2  # s between two looks at the processes
-END = {'recorder': 60.0}  # s to write what it still has; 10 s for the others
+END = {'recorder': 60.0, 'monitors': 60.0}  # s to write what it has, to take leave of DDS for many
+NAMED = 8  # valves whose names are printed
 FIRST_PAUSE, LONGEST_PAUSE = 1.0, 30.0  # s before a node that has died is started again
 STABLE = 60.0  # s after which a node counts as running
 FOREVER = 1e8  # s of simulated time
@@ -197,6 +198,26 @@ def parser() -> argparse.ArgumentParser:
     return p
 
 
+def greeting(valves: list[Valve], options: argparse.Namespace) -> str:
+    """
+    Say what is being started.
+
+    :param valves: the fleet.
+    :param options: the command line.
+    :return: lines of text.
+    """
+    names = [valve.name for valve in valves[:NAMED]] + ['...'] * (len(valves) > NAMED)
+    lines = [f'{len(valves)} valve(s): {", ".join(names)}; logs in {options.logs}; '
+             'Ctrl-C ends all, a second one at once']
+    cores = os.cpu_count() or 1
+    if not options.processes and len(valves) > cores:
+        lines.append(f'{2 * len(valves)} processes monitor them on {cores} cores: '
+                     f'--processes {cores} does it at half the cost')
+    if options.dashboard:
+        lines.append(f'The dashboard opens at http://{options.host}:{options.port}')
+    return '\n'.join(lines)
+
+
 def main(args: Sequence[str] | None = None) -> int:
     """
     Run the fleet until a signal comes.
@@ -219,20 +240,14 @@ def main(args: Sequence[str] | None = None) -> int:
         tasks = tasks_of(valves, options)
         with Processes(options.logs) as processes:
             keeper = Keeper(processes, tasks)
-            print(f'{len(valves)} valve(s): {", ".join(valve.name for valve in valves)}; '
-                  f'logs in {options.logs}; Ctrl-C ends all, a second one at once', flush=True)
-            cores = os.cpu_count() or 1
-            if not options.processes and len(valves) > cores:
-                print(f'{2 * len(valves)} processes on {cores} cores: --processes {cores} does '
-                      'it with less', flush=True)
-            if options.dashboard:
-                print(f'The dashboard opens at http://{options.host}:{options.port}', flush=True)
+            print(greeting(valves, options), flush=True)
             end = time.monotonic() + (options.seconds or 1e9)
             while not stop and time.monotonic() < end:
                 time.sleep(LOOK)
                 keeper.look()
             signals = len(stop)
-            killed = processes.end_all(patient_with=END, hurry=lambda: len(stop) > signals)
+            patience = {t.label: END[t.executable] for t in tasks if t.executable in END}
+            killed = processes.end_all(patient_with=patience, hurry=lambda: len(stop) > signals)
             if killed:
                 print(f'run: killed, as they did not end: {", ".join(killed)}', file=sys.stderr)
     except (FleetError, ProcessError) as problem:
