@@ -215,6 +215,36 @@ def small(runs: int) -> dict[str, Any]:
     return {'rows': rows}
 
 
+def strong(runs: int) -> dict[str, Any]:
+    """Size of strong changes after short and long fault-free operation, VERIFY of 60 s."""
+    cases: list[tuple[str, float, Callable[[float], tuple[tuple[Fault, ...], dict]]]] = [
+        ('friction ramp to +20', 20.0, lambda t: ((Fault('f4', 1.0, t, 20.0),), {})),
+        ('friction ramp to +5', 5.0, lambda t: ((Fault('f4', 0.25, t, 20.0),), {})),
+        ('friction step +3', 3.0, lambda t: ((Fault('f4', 0.15, t),), {}))]
+    cases += [(f'spring {change:+.0%}', change, lambda t, c=change: stiffened('lugre', c, t))
+              for change in (1.0, -1.0, 0.3, -0.3)]
+    rows = []
+    for minutes in (0.5, 10.0, 30.0):
+        for name, size, make in tqdm(cases, desc=f'strong, {minutes:g} min'):
+            values, stated = [], []
+            for k in range(runs):
+                t_fault = 125.0 + 60.0 * minutes
+                faults, constants = make(t_fault)
+                result = run(plant_run(10000 + k, t_fault + 180.0, 'lugre', faults, **constants),
+                             SETTINGS)
+                last = result.decisions[-1]
+                truth = 'friction' if 'friction' in name else 'elastic'
+                if family(CAUSES[last['cause']]) == truth:
+                    values.append(float(last['strength']))
+                    stated.append(float(last['spread']))
+            rows.append({'change': name, 'min since VERIFY': minutes,
+                         'named': f'{len(values)}/{runs}',
+                         'value': round(float(np.mean(values)), 4),
+                         'sd': round(float(np.std(values)), 4),
+                         'stated sd': round(float(np.mean(stated)), 4), 'true': size})
+    return {'rows': rows}
+
+
 def quantiles(values: list[float]) -> list[float] | None:
     return [round(float(q), 1) for q in np.quantile(values, [0.5, 0.9])] if values else None
 
@@ -417,9 +447,9 @@ def cost(_: int) -> dict[str, Any]:
 
 
 PARTS: dict[str, tuple[Callable[[int], dict[str, Any]], int]] = {
-    'isolation': (isolation, 34), 'small': (small, 30), 'drift': (drift, 10),
-    'healthy': (healthy, 200), 'day': (day, 24), 'plug': (plug, 25), 'sensors': (sensors, 8),
-    'supply': (supply, 10), 'cost': (cost, 1)}
+    'isolation': (isolation, 34), 'small': (small, 30), 'strong': (strong, 32),
+    'drift': (drift, 10), 'healthy': (healthy, 200), 'day': (day, 24), 'plug': (plug, 25),
+    'sensors': (sensors, 8), 'supply': (supply, 10), 'cost': (cost, 1)}
 
 
 def main() -> None:

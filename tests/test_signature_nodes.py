@@ -1,16 +1,23 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Topic `signature` of running nodes: names a fault, as in replay, also after a restart."""
+"""
+Topic `signature` of running nodes: names a fault, as in replay, also after a restart; tells how
+long a stored trend takes to its limit.
+"""
 
 import numpy as np
 import pytest
 from damadics_bringup.processes import parameters
+from damadics_fd.core.alarm import NE107
 from damadics_fd.core.pipeline import run
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.signature_types import CAUSES, known
+from damadics_fd.reference import Reference, save_reference
 from damadics_fd.ros import qos
-from damadics_msgs.msg import Float64Stamped, Measurement, Signature
+from damadics_fd.trends import TrendFile, series_name
+from damadics_msgs.msg import FaultEvent, FaultFlag, Float64Stamped, Measurement, Signature
 from damadics_plant import simulate
+from diagnostic_msgs.msg import DiagnosticArray
 
 pytestmark = pytest.mark.ros
 SIGNALS = ('cv', 'x1', 'p1', 'p2', 't1', 'flow', 'ps')
@@ -55,6 +62,8 @@ def send(peer, columns: dict[str, np.ndarray]) -> None:
 
 def test_a_fault_of_the_running_plant_gets_its_cause_and_replay_says_the_same(chain, processes):
     measured = chain.listen(Measurement, 'measurement', qos.SAMPLES)
+    flags = chain.listen(FaultFlag, 'fault_flag', qos.FLAG)
+    events = chain.listen(FaultEvent, 'fault_event', qos.EVENTS)
     processes.start('damadics_plant', 'plant', parameters(
         scenario='random_spring', model='lugre', noise=True, rate=RATE, duration=120.0,
         real_time_factor=8.0, wait_for_subscribers=2))
@@ -67,6 +76,10 @@ def test_a_fault_of_the_running_plant_gets_its_cause_and_replay_says_the_same(ch
     assert last.cause == Signature.CAUSE_SPRING_STIFFER
     assert last.value == pytest.approx(1.0, abs=0.05) and last.confidence > 0.95
     assert np.isnan(last.time_to_limit).all(), 'there is no trend of two minutes'
+    told = events[-1]
+    assert told.cause == 'spring_stiffer' and told.level == flags[-1].level
+    assert told.level >= FaultFlag.NE107_OUT_OF_SPECIFICATION, 'the class of the cause'
+    assert 'stiffer' in told.text and NE107[told.level] in told.text
     columns = {'stamp': np.array([stamp_of(m) for m in measured])}
     columns |= {name: np.array([getattr(m, name) for m in measured]) for name in SIGNALS}
     decisions = run(columns, SETTINGS).decisions
@@ -111,3 +124,65 @@ def test_a_restarted_detector_explains_a_fault_at_once(chain, processes):
     again = {**late, 'stamp': late['stamp'] - late['stamp'][0]}
     send(chain, {name: values[:400] for name, values in again.items()})
     assert signatures[-1].state == Signature.STATE_LEARN, 'another run was judged by the old one'
+
+
+NOW = 1_780_000_000_000_000_000  # ns, a plant's clock
+DAY = 86400.0
+SLOPES = (-0.001, 0.0, 0.05)  # per day: spring, preload [N], friction
+DEVIATIONS = (0.0005, 2.0, 0.02)
+ACTUATOR = 'LV-101'
+
+
+def store_history(folder, learned) -> TrendFile:
+    """Keep a reference and a trend of 20 days before NOW that leads to where the valve is now."""
+    save_reference(folder / f'{ACTUATOR}.signature', Reference(
+        ACTUATOR, {}, SETTINGS.to_dict(), learned, source='live', last_stamp=NOW - 10**9))
+    trend = TrendFile(folder, ACTUATOR, series_name(learned))
+    rng = np.random.default_rng(8)
+    for days in np.linspace(-20.0, -0.02, 80):
+        change = np.multiply(SLOPES, days) + DEVIATIONS * rng.standard_normal(3)
+        assert trend.add(NOW + round(days * DAY * 1e9), change.tolist(), DEVIATIONS)
+    return trend
+
+
+def test_a_stored_trend_is_published_with_its_band_and_the_time_to_its_limit(
+    processes, peer, tmp_path,
+):
+    columns = simulate('random_spring', rate=RATE, model='lugre', duration=68.0, noise=True,
+                       seed=3)  # its fault comes after 70 s
+    learned = run(columns, SETTINGS).detector.signature.save()
+    trend = store_history(tmp_path / 'signature', learned)
+    before = trend.path.read_text().count('\n')
+    signatures = peer.listen(Signature, 'signature', qos.FLAG)
+    reports = peer.listen(DiagnosticArray, '/diagnostics', qos.DIAGNOSTICS)
+    peer.listen(Float64Stamped, 'threshold', qos.SAMPLES)
+    processes.start('damadics_fd', 'estimator', parameters(**QUICK, actuator=ACTUATOR))
+    processes.start('damadics_fd', 'detector', parameters(
+        **QUICK, actuator=ACTUATOR, signature_folder=str(trend.path.parent)))
+    await_chain(peer)
+    send(peer, columns | {'stamp': columns['stamp'] + NOW})
+    first, last = signatures[0], signatures[-1]
+    assert first.state == last.state == Signature.STATE_MONITOR, 'the reference was not taken up'
+    assert first.theta.tolist() == learned['theta'][:4]
+    for message in (first, last):
+        np.testing.assert_allclose(message.trend, SLOPES, atol=[2e-5, 0.1, 8e-4])
+        assert message.limit[0] == -0.1 and message.limit[2] == 3.0
+        expected, earliest, latest = (np.array(values) / DAY for values in (
+            message.time_to_limit, message.time_to_limit_earliest, message.time_to_limit_latest))
+        assert expected[0] == pytest.approx(100.0, rel=0.03)
+        assert expected[2] == pytest.approx(60.0, rel=0.03)
+        for k in (0, 2):
+            assert 0.9 * expected[k] < earliest[k] < expected[k] < latest[k] < 1.1 * expected[k]
+        assert earliest[1] > 365.0, 'the preload does not move'
+    assert np.all(np.abs(last.change) < 4.0 * np.array(last.change_std)), 'nothing has changed'
+    assert 1e-4 < last.change_std[0] < 0.02 and 1e-3 < last.change_std[2] < 0.2
+    assert trend.path.read_text().count('\n') == before + 1, 'one point in 15 minutes'
+
+    def sentences() -> dict[str, str]:
+        status = [s for m in reports for s in m.status if 'detector' in s.name][-1:]
+        return {v.key: v.value for s in status for v in s.values if v.key.startswith('Trend')}
+
+    assert peer.wait(lambda: len(sentences()) == 3, 5.0)
+    words = sentences()['Trend of spring']
+    assert words.startswith('spring ') and '+-' in words
+    assert 'limit -0.1 in ' in words and ' days (' in words

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from damadics_fd.advice import load_causes
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.recording import Recording, find_recordings
 from damadics_fd.core.detector import Detector
@@ -85,7 +86,8 @@ def _play(recording: Recording, mode: str) -> Playback:
     topic = recording.topic if recording.topic != '/measurement' else ''
     done = Playback(' '.join(filter(None, (recording.path.name, topic))))
     settings = Settings.for_mode(mode)
-    estimator, detector, thinner = estimator_for(settings), Detector(settings), Thinner()
+    estimator, thinner = estimator_for(settings), Thinner()
+    detector = Detector(settings, load_causes().classes)
     first = last = None
     for columns in joined(recording.chunks(done.problems.append)):
         result = run(columns, settings, estimator, detector)

@@ -12,7 +12,6 @@ from typing import Any
 
 import yaml
 
-from damadics_fd.core.alarm import NORMAL
 from damadics_fd.core.events import Event
 from damadics_fd.core.signature_types import CAUSES
 from damadics_fd.trends import QUANTITIES
@@ -73,6 +72,11 @@ class CauseTable:
 
     causes: Mapping[str, Cause]
     limits: Mapping[str, tuple[float, ...]]
+
+    @property
+    def classes(self) -> tuple[int, ...]:
+        """NAMUR NE 107 class of each of CAUSES, as `Detector` takes them."""
+        return tuple(self.causes[name].ne107 for name in CAUSES)
 
     def __getitem__(self, cause: str) -> Cause:
         """Return the entry of a cause by its name."""
@@ -183,12 +187,10 @@ def explain(event: Event, table: CauseTable, tag: str) -> Event:
     :param event: a transition of the alarm.
     :param table: texts.
     :param tag: of the actuator.
-    :return: the event with text, advice and NE 107 class of its cause; a change that is too
-        small for maintenance keeps the class "normal".
+    :return: the event with text and advice of its cause; its class already counts the cause.
     """
     if event.cause in ('', 'none'):
         return event
     cause = table[event.cause]
     text, advice = cause.describe(tag, event.strength, event.spread, event.confidence)
-    level = cause.ne107 if event.level != NORMAL else NORMAL
-    return replace(event, text=f'{text}; {event.text}', advice=advice, level=level)
+    return replace(event, text=f'{text}; {event.text}', advice=advice)

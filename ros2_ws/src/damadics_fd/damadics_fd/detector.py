@@ -43,7 +43,7 @@ class DetectorNode(MonitoringNode):
     def __init__(self, arguments: list[str] | None = None) -> None:
         super().__init__('detector', 'estimate', START_ESTIMATOR, arguments)
         Detector(self.settings).update(READY)
-        self._core = Detector(self.settings)
+        self._core = Detector(self.settings, self._causes.classes)
         self._decision: Decision | None = None
         self._loaded: int | None = None  # stamp of the alarm state that was loaded
         self._judged = self._twice = 0

@@ -18,6 +18,7 @@ from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
 from tqdm import tqdm
 
+from damadics_fd.advice import load_causes
 from damadics_fd.bag.decoder import Columns
 from damadics_fd.bag.recording import SIGNALS, Recording
 from damadics_fd.core.detector import Detector
@@ -48,7 +49,8 @@ class Player(Node):
         self._state = self.create_publisher(FaultState, 'fault_state', qos.SAMPLES)
         self._judges = None
         if settings:
-            self._judges = estimator_for(settings), Detector(settings)
+            self._judges = estimator_for(settings), Detector(
+                settings, load_causes().classes)
             self._estimate = self.create_publisher(EstimateMessage, 'estimate', qos.SAMPLES)
             self._residual = self.create_publisher(Float64Stamped, 'residual', qos.SAMPLES)
             self._threshold = self.create_publisher(Float64Stamped, 'threshold', qos.SAMPLES)

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from damadics_fd.advice import load_causes
 from damadics_fd.bag.decoder import Columns
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.flags import FlagWriter
@@ -75,7 +76,8 @@ class Chain:
 
     def __init__(self, settings: Settings):
         self._settings = settings
-        self._estimator, self._detector = estimator_for(settings), Detector(settings)
+        self._estimator = estimator_for(settings)
+        self._detector = Detector(settings, load_causes().classes)
 
     def take(self, columns: Columns) -> Result:
         """Judge the next columns and keep everything."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damadics_fd.advice import CauseTable, load_causes
-from damadics_fd.core.signature import Signature
+from damadics_fd.core.signature import Signature, SignatureView
 from damadics_fd.core.signature_types import (
     N_TABLE,
     ONE,
@@ -127,7 +127,7 @@ def force_over_position(force_map: ForceMap, signature: Signature, path: Path | 
         figure = Figure(figsize=(11.5, 5.4), layout='constrained')
         whole, close = figure.subplots(1, 2)
         for axis, y in ((whole, force), (close, force - line)):
-            _branches(axis, x, y, v, then, BLUE, 'reference')
+            _branches(axis, x, y, v, then, BLUE, 'before the alarm')
             _branches(axis, x, y, v, now, ORANGE, 'since the alarm')
             axis.set_xlabel('stem position X  [stroke]')
             axis.set_xlim(0.0, 1.0)
@@ -137,11 +137,10 @@ def force_over_position(force_map: ForceMap, signature: Signature, path: Path | 
                    linewidth=1.0, label='learned spring line')
         speed = float(np.mean(abs(v))) if len(v) else 0.1
         band = (s.theta[SIGN] + s.theta[V] * speed) * signature.settings.force_scale
-        for side in (-1.0, 1.0):
-            close.axhline(side * band, color=BLUE, linewidth=1.0, linestyle=(0, (4, 3)))
-        close.annotate(f'learned friction {band:.0f} N', (0.99, band), ha='right', va='bottom',
-                       color=BLUE, fontsize=9, xytext=(0, 4), textcoords='offset points',
-                       bbox={'color': 'white', 'pad': 0.5, 'alpha': 0.8})
+        _friction_lines(close, grid, np.zeros(200), band, BLUE, 'learned')
+        if np.any(now):
+            shift, friction = _changed(signature, view, grid, band)
+            _friction_lines(close, grid, shift, friction, ORANGE, 'now')
         whole.set_title('force on the stem  [N]', loc='left')
         close.set_title('distance from the learned spring line  [N]', loc='left')
         close.axhline(0.0, color=GREY, linewidth=0.8)
@@ -154,6 +153,35 @@ def force_over_position(force_map: ForceMap, signature: Signature, path: Path | 
         path.parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(path, dpi=150, facecolor='white')
     return path
+
+
+def _changed(signature: Signature, view: SignatureView, x: Array,
+             band: float) -> tuple[Array, float]:
+    """Return what the named cause makes of the spring line and of the friction [N]."""
+    s, c = signature.state[0], signature.settings
+    shift = np.zeros(len(x))
+    if view.cause.startswith('friction'):
+        band *= 1.0 + view.value
+    elif view.cause.startswith('spring'):
+        shift = view.value * s.unit[X1] * (x + c.preload) * c.force_scale
+    elif view.cause == 'preload':
+        shift += view.value
+    else:
+        band = np.nan  # no line to draw
+    return shift, band
+
+
+def _friction_lines(axis: Any, x: Array, middle: Array, band: float, color: str,
+                    label: str) -> None:
+    """Draw the branches of a valve with this friction around its spring line."""
+    if not np.isfinite(band):
+        return
+    for side in (-1.0, 1.0):
+        axis.plot(x, middle + side * band, color=color, linewidth=1.1, linestyle=(0, (5, 3)))
+    axis.annotate(f'{label}: friction {band:.0f} N', (x[-1], middle[-1] + band), ha='right',
+                  va='bottom', color=color, fontsize=9, xytext=(0, 9),
+                  textcoords='offset points',
+                  bbox={'color': 'white', 'pad': 0.8, 'alpha': 0.85, 'linewidth': 0.0})
 
 
 def _spring_line(signature: Signature, x: Array, dp: Array) -> Array:

@@ -2,11 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Trends of spring, preload and friction of each actuator, kept in files across restarts."""
 
+import hashlib
+import json
 import math
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,6 +55,16 @@ def _span(seconds: float) -> str:
         if seconds >= 2.0 * size:
             return f'{seconds / size:.0f} {unit}'
     return f'{seconds:.0f} s'
+
+
+def series_name(signature: Mapping[str, Any]) -> str:
+    """
+    Name the series of the points that are measured against a reference.
+
+    :param signature: the reference, as `Signature.save` returned it.
+    :return: short hash of what was learned.
+    """
+    return hashlib.sha256(json.dumps(signature['theta']).encode()).hexdigest()[:16]
 
 
 class TrendFile:

@@ -151,6 +151,37 @@ def test_a_saved_reference_continues_where_it_was():
     assert restarted.state.tobytes() == before
 
 
+def test_pressures_that_are_measured_late_do_not_pass_for_friction():
+    stamp, x, ps, dp = valve(seed=4)
+    lag = 0.02
+    swing = 0.15e6 * np.sin(2 * np.pi * 0.1 * stamp * 1e-9)
+    late = 0.15e6 * np.sin(2 * np.pi * 0.1 * (stamp * 1e-9 - lag))
+    ps = ps + swing * C.plug_area / np.interp(x, C.plug_x, C.plug_km) / C.diaphragm_area
+    signature, _ = run((stamp, x, ps, dp + late))
+    s = signature.state[0]
+    assert signature.view().cause == 'none'
+    assert s.theta[st.LAG] == pytest.approx(lag, abs=0.004)
+    plain = run(valve(seed=4))[0].state[0]
+    assert s.theta[st.SIGN] == pytest.approx(plain.theta[st.SIGN], rel=0.03)
+    assert s.sigma < 1.15 * plain.sigma
+
+
+def test_the_unit_of_sizes_is_refined_without_moving_what_alarms_rest_on():
+    columns = valve(seconds=420.0, t_fault=330.0, dF=3.0)
+    before, _ = run(columns, keep=slice(0, 28000))
+    early = before.state[0].copy()
+    assert early.state == st.STATE_MONITOR and early.unit.tolist() == early.theta[:4].tolist()
+    signature, _ = run(columns, before, keep=slice(28000, None))
+    s = signature.state[0]
+    assert s.theta.tolist() == early.theta.tolist() and s.J0.tolist() == early.J0.tolist()
+    assert s.unit_weight >= 2.0 * early.unit_weight
+    assert np.all(np.diag(s.unit_cov) < 0.8 * np.diag(early.unit_cov))
+    view = signature.view()
+    assert view.cause == 'friction_up' and view.value == pytest.approx(3.0, abs=0.15)
+    relative = np.sqrt(s.unit_cov[st.SIGN, st.SIGN]) / s.unit[st.SIGN]
+    assert view.std > 3.0 * 0.5 * relative, 'a share is no better known than its unit'
+
+
 def test_missing_samples_cost_blocks_not_truth():
     columns = valve(seed=9, seconds=330.0, dF=1.0)
     rng = np.random.default_rng(0)

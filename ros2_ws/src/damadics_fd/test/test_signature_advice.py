@@ -4,7 +4,7 @@ import math
 
 import pytest
 from damadics_fd.advice import CauseTableError, explain, load_causes
-from damadics_fd.core.alarm import CHANGED, NORMAL, OUT_OF_SPECIFICATION, RAISED
+from damadics_fd.core.alarm import CHANGED, RAISED
 from damadics_fd.core.events import Event
 from damadics_fd.core.signature_types import CAUSES
 from damadics_fd.offline import collect
@@ -66,16 +66,14 @@ def event(transition: int, occurrence: int = 1, cause: str = '', level: int = 1,
                  cause=cause, text='raised', **values)
 
 
-def test_an_event_is_worded_and_classed_by_its_cause():
+def test_an_event_is_worded_by_its_cause():
     table = load_causes()
     plain = event(RAISED)
     assert explain(plain, table, 'V') is plain
     named = explain(event(CHANGED, cause='spring_softer', strength=-0.05, spread=0.001,
                           confidence=0.99), table, 'V')
     assert named.text == 'V: spring softer by -5.0% +- 0.2% (confidence 99%); raised'
-    assert named.level == OUT_OF_SPECIFICATION and 'crack' in named.advice
-    small = explain(event(CHANGED, cause='spring_softer', level=NORMAL), table, 'V')
-    assert small.level == NORMAL, 'a change too small for maintenance'
+    assert 'crack' in named.advice
 
 
 def test_replay_puts_a_later_cause_into_its_detection():

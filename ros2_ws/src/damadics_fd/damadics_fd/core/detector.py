@@ -15,7 +15,7 @@ from damadics_fd.core.jit import jit, layer
 from damadics_fd.core.modes import PHASE_HOLD, PHASE_PAPER
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.signature import Signature
-from damadics_fd.core.signature_types import SignatureSettings
+from damadics_fd.core.signature_types import NO_CLASSES, SignatureSettings
 from damadics_fd.core.threshold import threshold
 
 LARGE = 1e9  # ratio to a threshold of zero
@@ -27,7 +27,7 @@ DECISION = np.dtype((np.record, np.dtype([
     ('transitions', 'i8'),
 ], align=True)))
 STATE = np.dtype((np.record, np.dtype([
-    *decision.STATE, *alarm.STATE, ('place', 'f8'), ('moved', 'i8'),
+    *decision.STATE, *alarm.STATE, ('place', 'f8'), ('moved', 'i8'), ('told', 'i8'),
 ], align=True)))
 STIR = 0.01  # of the stroke: less is no motion of the stem
 ACCEPTED = np.zeros(1, np.uint8)
@@ -43,7 +43,7 @@ class Decision(NamedTuple):
     exceed: bool  # the residual counts and is not below the threshold
     fault: bool  # a fault is flagged
     state: int
-    level: int
+    level: int  # NAMUR NE 107
     since: int  # last change of `fault`
     onset: int  # estimated onset of the fault, 0 while there is none
     occurrence: int  # faults flagged since the start
@@ -95,8 +95,11 @@ def step(s: Any, c: Any, g: Any, gc: Any, e: Any, d: Any) -> None:
     own = signature_step.own_level(g, gc)
     d.transitions = alarm.step(s, c, e.stamp, armed or g.own != 0, exceed or own > 0,
                                s.count[0] > 0, max(level, own), ratio)
-    if g.cause != cause and s.active:
-        d.transitions |= 1 << alarm.CHANGED
+    present = s.active or s.latched
+    if g.cause != cause or not present:
+        s.told = alarm.NORMAL
+        if present:
+            d.transitions |= 1 << alarm.CHANGED
     d.residual = residual
     d.threshold = rho
     d.ratio = ratio
@@ -104,6 +107,30 @@ def step(s: Any, c: Any, g: Any, gc: Any, e: Any, d: Any) -> None:
     if s.moved < 0 or e.stamp < s.moved or abs(e.x1 - s.place) > STIR:
         s.place = e.x1
         s.moved = e.stamp
+    if s.flag:
+        shown = class_of(s, g, gc, armed)
+        if shown != s.told and d.transitions == 0:  # any other event tells the class as well
+            d.transitions = 1 << alarm.CHANGED
+        s.told = shown
+
+
+@jit
+def class_of(s: Any, g: Any, gc: Any, armed: bool) -> int:
+    """
+    Return the NAMUR NE 107 class that is shown: the worse of residual and cause.
+
+    :param s: state record.
+    :param g: state record of the signature.
+    :param gc: settings record of the signature.
+    :param armed: decisions count.
+    :return: a class; normal for a change too small for maintenance.
+    """
+    level: int = alarm.level_of(s, armed)
+    if not s.flag:
+        return level
+    if s.peak < 1.0 and not signature_step.material(g, gc, s.told > alarm.NORMAL):
+        return alarm.NORMAL  # the approximator is content and the change is small
+    return max(level, int(gc.ne107[g.cause]))
 
 
 @jit
@@ -120,9 +147,7 @@ def report(s: Any, g: Any, gc: Any, e: Any, d: Any) -> None:
     armed = decision.armed(e.phase)
     d.stamp = e.stamp
     d.state = alarm.state_of(s, armed, e.phase)
-    d.level = alarm.level_of(s, armed)
-    if s.flag and s.peak < 1.0 and not signature_step.material(g, gc):
-        d.level = alarm.NORMAL  # the approximator is content and the change is small
+    d.level = class_of(s, g, gc, armed)
     d.fault = s.flag
     d.since = s.since
     d.onset = s.onset if s.active or s.latched else 0
@@ -189,12 +214,14 @@ class Detector:
     Decide from one estimate after the other whether there is a fault.
 
     :param settings: all settings, the same as those of the estimator.
+    :param classes: least NAMUR NE 107 class of an alarm by its cause, in the order of
+        `signature_types.CAUSES`; without it the class tells the size of the residual alone.
     """
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: Settings, classes: Sequence[int] = NO_CLASSES) -> None:
         self.settings = settings
         self.state = np.zeros(1, STATE)
-        self.signature = Signature(SignatureSettings.of(settings))
+        self.signature = Signature(SignatureSettings.of(settings, classes))
         self._settings = settings.record()
         self._estimate = np.zeros(1, ESTIMATE)
         self._decision = np.zeros(1, DECISION)

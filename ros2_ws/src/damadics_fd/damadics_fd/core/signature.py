@@ -21,6 +21,7 @@ from damadics_fd.core.signature_types import (
     STATE_DTYPE,
     STATE_MONITOR,
     STATE_VERIFY,
+    X1,
     SignatureSettings,
     known,
     settings_record,
@@ -30,32 +31,16 @@ UNKNOWN = ('air_rate', 'now', 'now_std')
 
 
 @jit
-def update(
+def _update(
     s: Any, c: Any, t: int, x: float, ps: float, dp: float, ready: bool, alarm: bool
 ) -> int:
-    """
-    Take one accepted sample; `step` for arrays of length 1, to be called from Python.
-
-    :param s: state.
-    :param c: settings.
-    :param t: [ns] stamp.
-    :param x: [1] raw stem position / stroke.
-    :param ps: [Pa] chamber pressure, gauge; NaN where not measured.
-    :param dp: [Pa] P1 - P2.
-    :param ready: False while the filters settle or the input is interrupted.
-    :param alarm: an alarm is present or latched, whoever raised it.
-    :return: QUIET, BLOCK or CHANGED.
-    """
+    """Call `step` with the records of arrays of length 1."""
     return step(s[0], c[0], t, x, ps, dp, ready, alarm)
 
 
 @jit
-def clear(state: Any) -> None:
-    """
-    Clear the latched alarm; what follows is judged afresh.
-
-    :param state: structured array of length 1 (STATE_DTYPE).
-    """
+def _clear(state: Any) -> None:
+    """Clear the latched alarm of an array of length 1."""
     s = state[0]
     if s.state == STATE_ALARM:
         s.alarm_in = 0
@@ -98,12 +83,12 @@ class Signature:
         :param alarm: an alarm is present or latched, whoever raised it.
         :return: QUIET, BLOCK or CHANGED.
         """
-        result: int = update(self.state, self.record, t, x, ps, dp, ready, alarm)
+        result: int = _update(self.state, self.record, t, x, ps, dp, ready, alarm)
         return result
 
     def clear(self) -> None:
-        """Clear the latched alarm."""
-        clear(self.state)
+        """Clear the latched alarm; what follows is judged afresh."""
+        _clear(self.state)
 
     def relearn(self) -> None:
         """Forget the reference and learn it anew from the next sample on."""
@@ -149,8 +134,10 @@ class Signature:
             state[name][0] = given
             if not np.isfinite(state[name]).all():
                 raise ValueError(f'signature reference: {name} is not finite')
-        if not (state['sigma'][0] > 0.0 and state['r_ref'][0] > 0.0 and state['kappa'][0] >= 1.0):
-            raise ValueError('signature reference: sigma, r_ref and kappa must be positive')
+        if not (state['sigma'][0] > 0.0 and state['r_ref'][0] > 0.0 and state['kappa'][0] >= 1.0
+                and state['unit'][0, X1] > 0.0 and state['unit_weight'][0] > 0.0):
+            raise ValueError(
+                'signature reference: sigma, r_ref, kappa, stiffness and weight must be positive')
         state['state'] = STATE_MONITOR if state['verified'][0] else STATE_VERIFY
         state['index'] = -1
         state['n_learn'] = np.inf  # its sums are not kept: VERIFY only checks it

@@ -14,6 +14,7 @@ from damadics_fd.core.signature_types import (
     FAMILY_SUPPLY,
     FAMILY_UNDETERMINED,
     SET_ALARM,
+    SET_UNIT,
     STATE_ALARM,
     STATE_MONITOR,
     STATE_VERIFY,
@@ -84,12 +85,14 @@ def end_alarm(s: Any) -> None:
     """
     s.own = 0
     s.own_t = 0
+    s.stage2 = 0
     s.family = FAMILY_UNDETERMINED
     s.cause = CAUSE_NONE
     forget_cause(s)
     s.r_max = 0.0
     s.stick = 0
     clear_set(s, SET_ALARM)
+    clear_set(s, SET_UNIT)  # after a repair it may be another valve
     restart_sets(s)
     restart_air(s)
     s.state = STATE_MONITOR if s.verified else STATE_VERIFY

@@ -12,6 +12,7 @@ from typing import Any
 
 from damadics_fd.core.jit import jit
 from damadics_fd.core.signature_types import (
+    LAG,
     N_TABLE,
     ONE,
     PB,
@@ -166,6 +167,7 @@ def regressor(s: Any, c: Any) -> None:
     i, share = table_node(x)
     ph[TABLE + i] = (1.0 - share) * dp * gain
     ph[TABLE + i + 1] = share * dp * gain
+    ph[LAG] = gain * (s.bdp[2] - s.bdp[0]) / (s.bt[2] - s.bt[0])
     ph[SIGN_T] = 0.0
     ph[X1_T] = 0.0
     ph[PB] = s.bp[1]
@@ -179,7 +181,7 @@ def judge_block(s: Any, c: Any) -> None:
     """
     Classify the middle block as moving, standing or neither and build its regressor.
 
-    :param s: state record; sets moving, standing, x, u, v, w and, if moving, ph.
+    :param s: state record; sets moving, standing, slide, x, u, v, w and, if moving, ph.
     :param c: settings record.
     """
     x = s.bx[1]
@@ -196,10 +198,15 @@ def judge_block(s: Any, c: Any) -> None:
     s.v = v
     s.moving = 0
     s.standing = 0
+    if s.run <= 3:
+        s.slide = 0  # the first block after a gap
     # equal signs drop reversals, the minimum drops break-away blocks
     if in_range and fast and d1 * d2 > 0.0 and min(abs(d1), abs(d2)) >= step:
         s.moving = 1
+        s.slide += 1
         s.w = 1.0 / (1.0 + c.stribeck_weight * math.exp(-((v / c.v_stribeck) ** 2)))
         regressor(s, c)
-    elif in_range and abs(v) < c.v_min and max(abs(d1), abs(d2)) < 3.0 * step:
+        return
+    s.slide = 0
+    if in_range and abs(v) < c.v_min and max(abs(d1), abs(d2)) < 3.0 * step:
         s.standing = 1

@@ -7,7 +7,8 @@ from typing import Any
 
 from damadics_fd.core.jit import jit, layer
 from damadics_fd.core.signature_cues import stick_evidence
-from damadics_fd.core.signature_evidence import evaluate, joint_change, physical_value
+from damadics_fd.core.signature_evidence import evaluate, joint_change
+from damadics_fd.core.signature_size import physical_value
 from damadics_fd.core.signature_sums import clear_set
 from damadics_fd.core.signature_types import (
     CAUSE_ELASTIC,
@@ -42,6 +43,7 @@ P_LONG = 0.99  # names a family by the long record alone
 P_STICK = 0.96
 STAGE2_EVIDENCE = 30.0
 STAGE2_STRIDE = 5
+STAGE2_SETTLED, STAGE2_STRONG = 2, 3
 SETTLED = 30.0  # [s] after the alarm: from then on the long record sizes a friction change
 STRONG = 1.0  # friction change of which the long record begins anew then
 D_VERIFY = 12.0  # largest D expected of a right model
@@ -117,7 +119,7 @@ def decide(s: Any, c: Any) -> None:
             if moving_unchanged(s, c, D - 2.0 * b_r):
                 name_stick(s, p_f)
             else:
-                name_friction(s, m, p_f)
+                name_friction(s, c, m, p_f)
         elif s.family == FAMILY_ELASTIC and p_f < 0.5:
             name_elastic(s, c, m, 1.0 - p_f)
     elif s.r_max > NULL_STICK * s.r_ref and s.n_alarm >= NULL_MOVING and moving_unchanged(
@@ -179,19 +181,19 @@ def name_stick(s: Any, p: float) -> None:
 
 
 @jit
-def name_friction(s: Any, m: int, p: float) -> None:
+def name_friction(s: Any, c: Any, m: int, p: float) -> None:
     """
     Report a firm friction change.
 
     :param s: state record.
+    :param c: settings record.
     :param m: set with the evidence.
     :param p: posterior of friction.
     """
     s.confidence = p
-    if s.stage2 == 2 and s.D[SET_SLOW] > 0.0:
+    if s.stage2 >= STAGE2_SETTLED and s.D[SET_SLOW] > 0.0:
         m = SET_SLOW  # as the last stage 2 left it
-    s.cause_value = s.value[m][FRICTION]
-    s.cause_std = s.sd[m][FRICTION]
+    s.cause_value, s.cause_std = physical_value(s, c, m, FRICTION)
     s.cause = CAUSE_FRICTION_UP if s.cause_value >= 0.0 else CAUSE_FRICTION_DOWN
 
 
@@ -259,8 +261,9 @@ def second_stage(s: Any, c: Any) -> None:
         return
     settled = (s.t - s.alarm_t) * 1e-9 >= SETTLED
     if s.stage2 == 1 and s.family == FAMILY_FRICTION and settled:
-        s.stage2 = 2
+        s.stage2 = STAGE2_SETTLED
         if abs(s.cause_value) > STRONG:
+            s.stage2 = STAGE2_STRONG
             clear_set(s, SET_SLOW)  # it holds the growth of the fault; of a small one all counts
     m = SET_SLOW
     s.due[m] += 1
@@ -277,7 +280,7 @@ def second_stage(s: Any, c: Any) -> None:
         p_f = math.exp(s.logp[m][FRICTION])
         if p_f > P_LONG:
             s.family = FAMILY_FRICTION
-            name_friction(s, m, p_f)
+            name_friction(s, c, m, p_f)
         elif 1.0 - p_f > P_LONG:
             s.family = FAMILY_ELASTIC
     if s.family != FAMILY_ELASTIC:

@@ -16,17 +16,15 @@ from numpy.typing import NDArray
 
 from damadics_fd.core.jit import jit
 from damadics_fd.core.signature_linalg import cholesky, forward, inverse
+from damadics_fd.core.signature_size import SMALL_FRICTION
 from damadics_fd.core.signature_sums import growth_time
 from damadics_fd.core.signature_types import (
-    DP_OFFSET,
     FRICTION,
     N_COL,
     N_HYP,
     N_REF,
     ONE,
-    POSITION_GAIN,
     PRELOAD,
-    PRESSURE_GAIN,
     SET_ALARM,
     SIGN,
     SIGN_T,
@@ -195,7 +193,7 @@ def evaluate(s: Any, c: Any, m: int, eps: float, b_r: float, b_p: float) -> floa
     explained = solve_group(s, m, iv, FRICTION_COLUMNS, count,
                             (c.change_std[1], c.change_std[0], c.growth_std[0], 1.0))
     v_mean = s.vb[m] / ne
-    scale = max(s.theta[SIGN] + s.theta[V] * v_mean, 1e-3)
+    scale = max(s.theta[SIGN] + s.theta[V] * v_mean, SMALL_FRICTION)
     logp[FRICTION] = J_0 - explained
     value[FRICTION], std[FRICTION] = combine(s, count, v_mean, now, scale)
     if value[FRICTION] < -1.3 - SMALL / scale:
@@ -241,29 +239,6 @@ def evaluate(s: Any, c: Any, m: int, eps: float, b_r: float, b_p: float) -> floa
 
 
 @jit
-def physical_value(s: Any, c: Any, m: int, h: int) -> tuple[float, float]:
-    """
-    Convert a change to what a person reads.
-
-    :param s: state record.
-    :param c: settings record.
-    :param m: index of the set.
-    :param h: hypothesis.
-    :return: value and standard deviation. Friction and spring as shares, preload in N, gains as
-        the sensor's gain error, P1 - P2 offset in Pa, position offset as share of the stroke.
-    """
-    value, std = s.value[m][h], s.sd[m][h]
-    if h == PRELOAD:
-        return value * c.force_scale, std * c.force_scale
-    if h in (POSITION_GAIN, PRESSURE_GAIN):
-        gain = 1.0 / max(1.0 - value, 1e-3)  # the column uses the measured, wrong value
-        return value * gain, std * gain * gain
-    if h == DP_OFFSET:
-        return -1e6 * value, 1e6 * std
-    return value, std
-
-
-@jit
 def joint_change(s: Any, c: Any, m: int) -> bool:
     """
     Estimate spring, preload and friction together, for the trends.
@@ -284,7 +259,7 @@ def joint_change(s: Any, c: Any, m: int) -> bool:
         return False
     H, d = s.H[0], s.d
     v = s.vb[m] / ne
-    scale = max(s.theta[SIGN] + s.theta[V] * v, 1e-3)
+    scale = max(s.theta[SIGN] + s.theta[V] * v, SMALL_FRICTION)
     s.now[0] = d[0] / s.theta[X1]
     s.now[1] = d[1] * c.force_scale
     s.now[2] = (d[2] + d[3] * v) / scale

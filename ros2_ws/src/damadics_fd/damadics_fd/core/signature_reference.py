@@ -1,11 +1,12 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
 """
-The fault-free valve: u = K x1 + b + c v + Fc sgn v + error of the plug force table.
+The fault-free valve: u = K x1 + b + c v + Fc sgn v + error of the plug force.
 
 Stiffness, preload, viscous and dry friction are the reference proper. The correction of the
-plug force, a piecewise linear share of it over the position, belongs to the valve too: 1 % of
-the plug force is as large as the whole dry friction, and no table is known that well.
+plug force belongs to the valve too, for 1 % of the plug force is as large as the whole dry
+friction: a piecewise linear share of it over the position, as no table is known that well, and
+the time by which P1 - P2 is measured too late, as 3 ms of a pulsating pressure are 1 N.
 """
 
 import math
@@ -16,9 +17,11 @@ from damadics_fd.core.signature_air import forget_air
 from damadics_fd.core.signature_linalg import inverse
 from damadics_fd.core.signature_sums import accumulate, clear_set
 from damadics_fd.core.signature_types import (
+    LAG,
     N_REF,
     N_TABLE,
     SET_ALARM,
+    SET_UNIT,
     SIGN,
     STATE_INSUFFICIENT,
     STATE_LEARN,
@@ -46,6 +49,8 @@ def start_learning(s: Any, c: Any) -> None:
     for i in range(TABLE):
         s.theta[i] = c.theta_nominal[i]
     clear_set(s, SET_ALARM)
+    clear_set(s, SET_UNIT)
+    s.unit_weight = 0.0
     s.n_learn = 0.0
     s.n_up = 0
     s.n_down = 0
@@ -109,49 +114,107 @@ def finish_learning(s: Any, c: Any) -> bool:
 
 
 @jit
-def solve_reference(s: Any, c: Any) -> bool:
+def fit_sums(s: Any, c: Any, m: int, theta: Any) -> float:
     """
-    Compute the reference from the sums over the fault-free valve.
+    Fit the fault-free model to the sums of one set.
 
-    :param s: state record; theta, J0, sigma and n_learn are written.
+    :param s: state record; Gm receives the covariance of the fit in units of sigma^2.
     :param c: settings record.
-    :return: False where the sums are not usable.
+    :param m: index of the set.
+    :param theta: receives the parameters.
+    :return: sigma, noise of a block; negative where the sums are not usable.
     """
-    S, q, wn = s.S[SET_ALARM], s.q[SET_ALARM], s.ne[SET_ALARM]
+    S, q = s.S[m], s.q[m]
     H, work, prior = s.Gm[0], s.L[0], s.Y[0]
-    n = len(s.theta)
+    n = len(theta)
     prior_precision(prior, c, work, n)
     for i in range(n):
         for j in range(n):
             H[i, j] = S[i, j] + prior[i, j]
     if not inverse(H, work, n):
-        return False
+        return -1.0
     for i in range(n):  # theta0 = H^-1 (q0 + Pi theta_nominal)
-        s.theta[i] = 0.0
+        theta[i] = 0.0
         for j in range(n):
             a = q[j]
             for k in range(TABLE):
                 a += prior[j, k] * c.theta_nominal[k]
-            s.theta[i] += H[i, j] * a
-    misfit, freedom = s.rr[SET_ALARM], wn
+            theta[i] += H[i, j] * a
+    misfit, freedom = s.rr[m], s.ne[m]
     for i in range(n):
-        misfit -= 2.0 * s.theta[i] * q[i]
+        misfit -= 2.0 * theta[i] * q[i]
         for j in range(n):
-            misfit += s.theta[i] * S[i, j] * s.theta[j]
+            misfit += theta[i] * S[i, j] * theta[j]
             freedom -= H[i, j] * S[j, i]  # parameters that the data, not the prior, decide
-    s.sigma = max(c.sigma_min, math.sqrt(max(misfit, 0.0) / max(freedom, 1.0)))
+    sigma: float = max(c.sigma_min, math.sqrt(max(misfit, 0.0) / max(freedom, 1.0)))
+    return sigma
+
+
+@jit
+def solve_reference(s: Any, c: Any) -> bool:
+    """
+    Compute the reference from the sums over the fault-free valve.
+
+    :param s: state record; theta, J0, sigma, n_learn and the unit of sizes are written.
+    :param c: settings record.
+    :return: False where the sums are not usable.
+    """
+    sigma = fit_sums(s, c, SET_ALARM, s.theta)
+    if sigma < 0.0:
+        return False
+    s.sigma = sigma
+    s.n_learn = s.ne[SET_ALARM]
+    take_unit(s, s.theta, sigma, s.n_learn)
+    H, n = s.Gm[0], len(s.theta)
     for i in range(n):
         for j in range(n):
-            H[i, j] *= INFLATION * s.sigma * s.sigma
-        floor = c.floor[min(i, TABLE - 1)] if i < TABLE else c.plug_floor
+            H[i, j] *= INFLATION * sigma * sigma
+        floor = c.floor[i] if i < TABLE else c.plug_floor
         H[i, i] += floor * floor
-    if not inverse(H, work, n):
+    if not inverse(H, s.L[0], n):
         return False
     for i in range(n):
         for j in range(n):
             s.J0[i, j] = H[i, j]
-    s.n_learn = wn
     return True
+
+
+@jit
+def take_unit(s: Any, theta: Any, sigma: float, weight: float) -> None:
+    """
+    State sizes from now on in units of the valve just fitted.
+
+    :param s: state record; Gm is read, the unit of sizes is written.
+    :param theta: parameters of the fit.
+    :param sigma: noise of a block.
+    :param weight: blocks that the fit rests on.
+    """
+    variance = (s.kappa * sigma) ** 2
+    for i in range(TABLE):
+        s.unit[i] = theta[i]
+        for j in range(TABLE):
+            s.unit_cov[i, j] = variance * s.Gm[0, i, j]
+    s.unit_weight = weight
+
+
+@jit
+def refine_unit(s: Any, c: Any) -> None:
+    """
+    Add a fault-free block to what sizes are stated in; fit anew when its record has doubled.
+
+    A strong change is a share of the learned value, and no better known than that. What alarms
+    rest on does not change.
+
+    :param s: state record.
+    :param c: settings record.
+    """
+    if s.unit_weight >= c.size_weight:
+        return
+    accumulate(s, SET_UNIT, 1.0, s.u)
+    if s.ne[SET_UNIT] >= 2.0 * s.unit_weight:
+        sigma = fit_sums(s, c, SET_UNIT, s.y0)
+        if sigma > 0.0:
+            take_unit(s, s.y0, sigma, s.ne[SET_UNIT])
 
 
 @jit
@@ -173,6 +236,7 @@ def prior_precision(Pi: Any, c: Any, work: Any, n: int) -> None:
         for j in range(N_TABLE):
             Pi[TABLE + i, TABLE + j] = c.plug_gain_std * c.plug_gain_std
         Pi[TABLE + i, TABLE + i] += c.plug_shape_std * c.plug_shape_std
+    Pi[LAG, LAG] = c.lag_std * c.lag_std
     inverse(Pi, work, n)
     for i in range(n):
         for j in range(n):
@@ -192,3 +256,6 @@ def widen_reference(s: Any, kappa: float) -> None:
     for i in range(N_REF):
         for j in range(N_REF):
             s.J0[i, j] /= kappa * kappa
+    for i in range(TABLE):
+        for j in range(TABLE):
+            s.unit_cov[i, j] *= kappa * kappa

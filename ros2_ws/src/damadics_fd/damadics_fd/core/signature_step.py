@@ -15,15 +15,29 @@ from damadics_fd.core.signature_alarm import (
 )
 from damadics_fd.core.signature_blocks import add_sample, close_block, judge_block, open_block
 from damadics_fd.core.signature_cues import check_passivity, stick_evidence, track_stick
-from damadics_fd.core.signature_decision import D_VERIFY, FULL_EVIDENCE, decide, watch
+from damadics_fd.core.signature_decision import (
+    D_VERIFY,
+    FULL_EVIDENCE,
+    STAGE2_EVIDENCE,
+    STAGE2_STRONG,
+    decide,
+    watch,
+)
 from damadics_fd.core.signature_reference import (
     finish_learning,
     learn_block,
+    refine_unit,
     solve_reference,
     start_learning,
     widen_reference,
 )
-from damadics_fd.core.signature_sums import accumulate, clear_set, growth_time, residual
+from damadics_fd.core.signature_sums import (
+    accumulate,
+    clear_set,
+    copy_set,
+    growth_time,
+    residual,
+)
 from damadics_fd.core.signature_types import (
     CAUSE_FRICTION_DOWN,
     CAUSE_FRICTION_UP,
@@ -32,6 +46,7 @@ from damadics_fd.core.signature_types import (
     CAUSE_SUPPLY,
     SET_ALARM,
     SET_SLOW,
+    SET_UNIT,
     SIGN,
     SIGN_T,
     STATE_ALARM,
@@ -44,6 +59,8 @@ from damadics_fd.core.signature_types import (
     X1_T,
 )
 
+HYSTERESIS = 0.9  # of a material change
+BREAK_AWAY = 2  # blocks of a stroke in which strong friction is still more than when sliding
 QUIET, BLOCK, CHANGED = 0, 1, 2  # what a step returns: nothing new, a block, a new judgement
 
 
@@ -52,16 +69,10 @@ def step(
     s: Any, c: Any, t: int, x: float, ps: float, dp: float, ready: bool, alarm: bool
 ) -> int:
     """
-    Take one accepted sample.
+    Take one accepted sample; its arguments are those of `Signature.update`.
 
     :param s: state record.
     :param c: settings record.
-    :param t: [ns] stamp.
-    :param x: [1] raw stem position / stroke.
-    :param ps: [Pa] chamber pressure, gauge; NaN where not measured.
-    :param dp: [Pa] P1 - P2.
-    :param ready: False while the filters settle or the input is interrupted.
-    :param alarm: an alarm is present or latched, whoever raised it.
     :return: QUIET, BLOCK (a block was judged) or CHANGED (state, family or cause are new).
     """
     if c.available == 0:
@@ -149,23 +160,28 @@ def own_level(s: Any, c: Any) -> int:
         return 0
     if s.cause == CAUSE_SUPPLY:
         return 1 if supply_lost(s, c) else 0
-    early = s.ne[SET_ALARM] < FULL_EVIDENCE
-    return 1 if early or s.D[SET_ALARM] > c.d_decide else 0
+    if s.ne[SET_ALARM] < FULL_EVIDENCE or s.stage2 == 0 or s.ne[SET_SLOW] < STAGE2_EVIDENCE:
+        return 1
+    # a slow change may hover about the limit on the short record, and is plain on the long one
+    return 1 if max(s.D[SET_ALARM], s.D[SET_SLOW]) > c.d_decide else 0
 
 
 @jit
-def material(s: Any, c: Any) -> bool:
+def material(s: Any, c: Any, before: bool) -> bool:
     """
     Tell whether the present change matters for maintenance (2.8).
 
     :param s: state record.
     :param c: settings record.
+    :param before: whether it mattered before; a change about the limit does not chatter.
     :return: False for a named friction or spring change that is certainly small.
     """
+    share = HYSTERESIS if before else 1.0
+    most = abs(s.cause_value) + 2.0 * s.cause_std
     if s.cause in (CAUSE_FRICTION_UP, CAUSE_FRICTION_DOWN):
-        return abs(s.cause_value) + 2.0 * s.cause_std >= c.material_friction
+        return most >= share * c.material_friction
     if s.cause in (CAUSE_SPRING_STIFFER, CAUSE_SPRING_SOFTER):
-        return abs(s.cause_value) + 2.0 * s.cause_std >= c.material_spring
+        return most >= share * c.material_spring
     return True
 
 
@@ -232,6 +248,8 @@ def monitor_block(s: Any, c: Any) -> bool:
     """
     r = residual(s)
     for m in range(SET_SLOW + 1):
+        if m == SET_SLOW and s.stage2 == STAGE2_STRONG and s.slide <= BREAK_AWAY:
+            continue
         accumulate(s, m, 1.0 - 1.0 / c.memory[m], r)
     s.n_moving += 1
     if s.state == STATE_ALARM:
@@ -246,6 +264,8 @@ def monitor_block(s: Any, c: Any) -> bool:
     watch(s, c)
     if s.own != 0:
         start_alarm(s)
+    elif s.state == STATE_MONITOR and max(s.D[0], max(s.D[1], s.D[2])) < D_VERIFY:
+        refine_unit(s, c)
     return False
 
 
@@ -262,6 +282,7 @@ def finish_verification(s: Any, c: Any) -> None:
     worst = max(s.d_max[0], max(s.d_max[1], s.d_max[2]))
     if s.ne[SET_ALARM] > s.n_learn:
         solve_reference(s, c)  # from LEARN and VERIFY: the size of a change rests on it
+    copy_set(s, SET_UNIT, SET_ALARM)
     clear_set(s, SET_ALARM)
     widen_reference(s, math.sqrt(max(1.0, worst / D_VERIFY)))
     restart_sets(s)

@@ -30,6 +30,22 @@ def clear_set(s: Any, m: int) -> None:
 
 
 @jit
+def copy_set(s: Any, to: int, m: int) -> None:
+    """
+    Copy the sums of one accumulator to another.
+
+    :param s: state record.
+    :param to: index of the set to overwrite.
+    :param m: index of the set to copy.
+    """
+    s.S[to][:, :] = s.S[m]
+    s.q[to][:] = s.q[m]
+    s.rr[to] = s.rr[m]
+    s.ne[to] = s.ne[m]
+    s.vb[to] = s.vb[m]
+
+
+@jit
 def accumulate(s: Any, m: int, forget: float, r: float) -> None:
     """
     Add the block under evaluation to one accumulator.

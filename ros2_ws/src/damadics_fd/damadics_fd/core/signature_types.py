@@ -8,6 +8,7 @@ Units of the normalised model: position X = stem / stroke, forces in units of FN
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any, Self
 
@@ -20,17 +21,18 @@ from damadics_fd.core.settings import Settings
 N_TABLE = 11  # nodes 0, 0.1 .. 1 of the correction of the plug force table
 X1, ONE, V, SIGN = 0, 1, 2, 3  # stiffness, preload, viscous friction, dry friction
 TABLE = 4  # first of the plug force corrections
-N_REF = TABLE + N_TABLE  # columns of the reference model
+LAG = TABLE + N_TABLE  # time by which the stem feels P1 - P2 earlier than it is measured
+N_REF = LAG + 1  # columns of the reference model
 PB, G, POS, POSX = N_REF, N_REF + 1, N_REF + 2, N_REF + 3
 SIGN_T, X1_T = N_REF + 4, N_REF + 5  # the same as SIGN and X1, growing with time
 N_COL = N_REF + 6
 N_FIT = 4  # columns that one hypothesis fits at most
 
 # -- accumulators ---------------------------------------------------------------------------
-N_SETS = 4
+N_SETS = 5
 # of numpy: numba would compile a function anew for each literal int that it is given
 _SETS: Any = np.arange(N_SETS)
-SET_FAST, SET_MID, SET_SLOW, SET_ALARM = _SETS
+SET_FAST, SET_MID, SET_SLOW, SET_ALARM, SET_UNIT = _SETS
 
 # -- hypotheses -----------------------------------------------------------------------------
 N_HYP = 8
@@ -56,6 +58,8 @@ CAUSES = (
     CAUSE_POSITION_GAIN, CAUSE_PRESSURE_GAIN, CAUSE_DP_OFFSET, CAUSE_POSITION_OFFSET,
     CAUSE_SUPPLY,
 ) = range(len(CAUSES))
+
+NO_CLASSES = (0,) * len(CAUSES)
 
 FILL, VENT = 0, 1  # ways of the chamber's air
 STROKES = 5  # strokes each way that show the top rate
@@ -103,6 +107,8 @@ class SignatureSettings:
     plug_shape_std: float = 0.01  # [1] and of each node of its table
     floor: tuple[float, float, float, float] = (0.001, 0.0005, 0.001, 0.0003)
     plug_floor: float = 0.0002
+    lag_std: float = 0.05  # [s] prior of the lag between P1 - P2 and position
+    size_weight: float = 5000.0  # blocks that the unit of a size rests on in the end
     sigma_min: float = 4e-4  # [1]
     # verification (2.3b)
     verify: float = 60.0  # [s]
@@ -132,13 +138,16 @@ class SignatureSettings:
     material_supply: float = 0.1  # [1] loss of the top filling rate
     chamber_volume: float = 5.5e-3  # [m3] dead volume V0
     stroke: float = 0.0381  # [m]
+    # NAMUR NE 107 class of each of CAUSES
+    ne107: tuple[float, ...] = NO_CLASSES
 
     @classmethod
-    def of(cls, settings: Settings) -> Self:
+    def of(cls, settings: Settings, classes: Sequence[int] = NO_CLASSES) -> Self:
         """
         Return the settings of the signature of an actuator.
 
         :param settings: of its estimator and detector.
+        :param classes: NAMUR NE 107 class of each of CAUSES.
         :return: geometry and choices taken over, the rest by default.
         """
         c = settings
@@ -153,7 +162,7 @@ class SignatureSettings:
             plug_gain_std=c.plug_gain_std, plug_shape_std=c.plug_shape_std,
             material_friction=c.material_friction, material_spring=c.material_spring,
             material_supply=c.material_supply, supply_pressure=c.supply_pressure,
-            chamber_volume=c.chamber_volume,
+            chamber_volume=c.chamber_volume, ne107=tuple(classes),
         )
 
     def __post_init__(self) -> None:
@@ -165,6 +174,8 @@ class SignatureSettings:
             )
         if np.any(np.diff(self.plug_x) <= 0.0) or min(self.plug_km) <= 0.0:
             raise ValueError('plug_x must increase and plug_km must be positive')
+        if len(self.ne107) != len(CAUSES):
+            raise ValueError(f'ne107 must have {len(CAUSES)} classes, got {len(self.ne107)}')
         for name in ('force_scale', 'diaphragm_area', 'sample_period', 'block', 'sigma_min'):
             if not getattr(self, name) > 0.0:
                 raise ValueError(f'{name} must be positive, got {getattr(self, name)}')
@@ -220,7 +231,10 @@ def settings_record(settings: SignatureSettings) -> NDArray[np.void]:
 # What a restarted node needs to go straight to MONITOR.
 REFERENCE_FIELDS: list[Any] = [
     ('theta', 'f8', (N_REF,)), ('J0', 'f8', (N_REF, N_REF)), ('sigma', 'f8'), ('r_ref', 'f8'),
-    ('kappa', 'f8'), ('verified', 'i8'), ('air_learned', 'i8', (2,)), ('air_ref', 'f8', (2,)),
+    ('kappa', 'f8'), ('verified', 'i8'),
+    # K b c Fc for stating sizes, their covariance, the blocks they rest on
+    ('unit', 'f8', (TABLE,)), ('unit_cov', 'f8', (TABLE, TABLE)), ('unit_weight', 'f8'),
+    ('air_learned', 'i8', (2,)), ('air_ref', 'f8', (2,)),
 ]
 REFERENCE_DTYPE = _record(REFERENCE_FIELDS)
 
@@ -235,8 +249,8 @@ STATE_DTYPE = _record(
         ('run', 'i8'), ('bx', 'f8', (3,)), ('bu', 'f8', (3,)), ('bp', 'f8', (3,)),
         ('bdp', 'f8', (3,)), ('bt', 'f8', (3,)),
         # block under evaluation
-        ('moving', 'i8'), ('standing', 'i8'), ('x', 'f8'), ('u', 'f8'), ('v', 'f8'), ('w', 'f8'),
-        ('ph', 'f8', (N_COL,)),
+        ('moving', 'i8'), ('standing', 'i8'), ('slide', 'i8'), ('x', 'f8'), ('u', 'f8'),
+        ('v', 'f8'), ('w', 'f8'), ('ph', 'f8', (N_COL,)),
         # LEARN
         ('n_learn', 'f8'), ('n_up', 'i8'), ('n_down', 'i8'), ('x_low', 'f8'), ('x_high', 'f8'),
         ('n_moving', 'i8'),

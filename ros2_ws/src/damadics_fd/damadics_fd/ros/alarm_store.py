@@ -12,7 +12,8 @@ from damadics_fd.ros.commands import state_folder
 FORMAT = 'damadics_fd alarm 1'
 EPOCH = 10**17  # ns; smaller stamps count from the start of a simulated run
 # what makes an alarm another one; the rest of the state changes with every sample
-MARKS = ('active', 'latched', 'acknowledged', 'occurrence', 'worst', 'shelved_until')
+MARKS = ('active', 'latched', 'acknowledged', 'occurrence', 'worst', 'shelved_until',
+         'told')
 
 
 def default_folder() -> Path:

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Publish the valve signature and keep its trends."""
 
-import hashlib
-import json
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -21,7 +19,7 @@ from damadics_fd.reference import Reference, load_reference, save_reference
 from damadics_fd.ros import qos
 from damadics_fd.ros.alarm_store import another_run
 from damadics_fd.ros.spin import StartError
-from damadics_fd.trends import QUANTITIES, Outlook, TrendFile
+from damadics_fd.trends import QUANTITIES, Outlook, TrendFile, series_name
 
 PERIOD = 1_000_000_000  # ns of measurement time between two messages without news
 
@@ -128,15 +126,15 @@ class SignaturePublisher:
 
     def _keep(self, folder: Path, stamp: int) -> None:
         s = self._signature.state[0]
-        if self._trend is None or s.theta.tolist() != self._saved.get('theta'):
+        known = self._saved.get('theta'), self._saved.get('unit_weight')
+        if self._trend is None or (s.theta.tolist(), float(s.unit_weight)) != known:
             saved = self._signature.save()
             if saved != self._saved:
                 save_reference(self._path(folder), Reference(
                     self._actuator, {}, self._settings.to_dict(), saved, source='live',
                     last_stamp=stamp))
                 self._saved = saved
-            name = hashlib.sha256(json.dumps(saved['theta']).encode()).hexdigest()[:16]
-            self._trend = TrendFile(folder, self._actuator, name)
+            self._trend = TrendFile(folder, self._actuator, series_name(saved))
         if s.now_t:
             self._trend.add(stamp, s.now.tolist(), s.now_std.tolist())
 
