@@ -76,13 +76,14 @@ def blocks(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray, np
     phi[:, POSX] = phi[:, POS] * x
     w = rng.uniform(0.1, 1.0, n)
     phi[:, st.LAG] = 0.1 * f * rng.standard_normal(n)
+    phi[:, st.STRIBECK] = np.sign(v) * np.exp(-((v / 0.026) ** 2))
     return phi, w, v
 
 
 def reference_posterior(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     theta = np.zeros(N_REF)
     theta[:4] = 1.0, 0.0, 0.0246, 0.0108
-    scale = np.array([1e-3, 1e-3, 1e-3, 5e-4] + [2e-3] * st.N_TABLE + [1e-3])
+    scale = np.array([1e-3, 1e-3, 1e-3, 5e-4] + [2e-3] * st.N_TABLE + [1e-3, 1e-3])
     m = rng.standard_normal((N_REF, N_REF)) * 0.3 + np.eye(N_REF)
     cov = scale[:, None] * (m @ m.T) * scale[None, :]
     return theta, np.linalg.inv(cov)

@@ -20,6 +20,7 @@ from damadics_fd.core.signature_types import (
     POSX,
     SIGN,
     SIGN_T,
+    STRIBECK,
     TABLE,
     X1,
     X1_T,
@@ -147,12 +148,13 @@ def table_force(s: Any, c: Any, x: float, dp: float) -> float:
 
 
 @jit
-def regressor(s: Any, c: Any) -> None:
+def regressor(s: Any, c: Any, slow: float) -> None:
     """
     Fill the regressor of the model and of every hypothesis (2.2, 2.4).
 
     :param s: state record: x, v and the middle block are read, ph is written.
     :param c: settings record.
+    :param slow: share of the Stribeck friction at this speed.
     """
     x = s.x
     dp = s.bdp[1]
@@ -168,6 +170,7 @@ def regressor(s: Any, c: Any) -> None:
     ph[TABLE + i] = (1.0 - share) * dp * gain
     ph[TABLE + i + 1] = share * dp * gain
     ph[LAG] = gain * (s.bdp[2] - s.bdp[0]) / (s.bt[2] - s.bt[0])
+    ph[STRIBECK] = ph[SIGN] * slow
     ph[SIGN_T] = 0.0
     ph[X1_T] = 0.0
     ph[PB] = s.bp[1]
@@ -204,8 +207,9 @@ def judge_block(s: Any, c: Any) -> None:
     if in_range and fast and d1 * d2 > 0.0 and min(abs(d1), abs(d2)) >= step:
         s.moving = 1
         s.slide += 1
-        s.w = 1.0 / (1.0 + c.stribeck_weight * math.exp(-((v / c.v_stribeck) ** 2)))
-        regressor(s, c)
+        slow = math.exp(-((v / c.v_stribeck) ** 2))
+        s.w = 1.0 / (1.0 + c.stribeck_weight * slow)
+        regressor(s, c, slow)
         return
     s.slide = 0
     if in_range and abs(v) < c.v_min and max(abs(d1), abs(d2)) < 3.0 * step:

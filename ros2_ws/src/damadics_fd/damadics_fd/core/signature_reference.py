@@ -1,12 +1,13 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
 """
-The fault-free valve: u = K x1 + b + c v + Fc sgn v + error of the plug force.
+The fault-free valve: u = K x1 + b + c v + (Fc + Fs e^-(v/vs)^2) sgn v + error of the plug force.
 
-Stiffness, preload, viscous and dry friction are the reference proper. The correction of the
-plug force belongs to the valve too, for 1 % of the plug force is as large as the whole dry
-friction: a piecewise linear share of it over the position, as no table is known that well, and
-the time by which P1 - P2 is measured too late, as 3 ms of a pulsating pressure are 1 N.
+Stiffness, preload, viscous and dry friction are the reference proper; what dry friction is more
+at low speed (Stribeck) is fitted to keep it apart from them. The correction of the plug force
+belongs to the valve too, for 1 % of the plug force is as large as the whole dry friction: a
+piecewise linear share of it over the position, as no table is known that well, and the time by
+which P1 - P2 is measured too late, as 3 ms of a pulsating pressure are 1 N.
 """
 
 import math
@@ -25,11 +26,13 @@ from damadics_fd.core.signature_types import (
     SIGN,
     STATE_INSUFFICIENT,
     STATE_LEARN,
+    STRIBECK,
     TABLE,
 )
 
 INFLATION = 4.0  # model error of the reference, as a factor on its variance
 STICK_FLOOR = 0.005  # [1] lowest stick range to compare with
+GROWTH = 1.25  # of the record between two fits of the unit: a fault's first blocks seldom count
 
 
 @jit
@@ -200,7 +203,7 @@ def take_unit(s: Any, theta: Any, sigma: float, weight: float) -> None:
 @jit
 def refine_unit(s: Any, c: Any) -> None:
     """
-    Add a fault-free block to what sizes are stated in; fit anew when its record has doubled.
+    Add a fault-free block to what sizes are stated in; fit anew when its record has grown.
 
     A strong change is a share of the learned value, and no better known than that. What alarms
     rest on does not change.
@@ -211,7 +214,7 @@ def refine_unit(s: Any, c: Any) -> None:
     if s.unit_weight >= c.size_weight:
         return
     accumulate(s, SET_UNIT, 1.0, s.u)
-    if s.ne[SET_UNIT] >= 2.0 * s.unit_weight:
+    if s.ne[SET_UNIT] >= GROWTH * s.unit_weight:
         sigma = fit_sums(s, c, SET_UNIT, s.y0)
         if sigma > 0.0:
             take_unit(s, s.y0, sigma, s.ne[SET_UNIT])
@@ -237,6 +240,7 @@ def prior_precision(Pi: Any, c: Any, work: Any, n: int) -> None:
             Pi[TABLE + i, TABLE + j] = c.plug_gain_std * c.plug_gain_std
         Pi[TABLE + i, TABLE + i] += c.plug_shape_std * c.plug_shape_std
     Pi[LAG, LAG] = c.lag_std * c.lag_std
+    Pi[STRIBECK, STRIBECK] = c.stribeck_std * c.stribeck_std
     inverse(Pi, work, n)
     for i in range(n):
         for j in range(n):

@@ -22,7 +22,8 @@ N_TABLE = 11  # nodes 0, 0.1 .. 1 of the correction of the plug force table
 X1, ONE, V, SIGN = 0, 1, 2, 3  # stiffness, preload, viscous friction, dry friction
 TABLE = 4  # first of the plug force corrections
 LAG = TABLE + N_TABLE  # time by which the stem feels P1 - P2 earlier than it is measured
-N_REF = LAG + 1  # columns of the reference model
+STRIBECK = LAG + 1  # more dry friction at low speed
+N_REF = STRIBECK + 1  # columns of the reference model
 PB, G, POS, POSX = N_REF, N_REF + 1, N_REF + 2, N_REF + 3
 SIGN_T, X1_T = N_REF + 4, N_REF + 5  # the same as SIGN and X1, growing with time
 N_COL = N_REF + 6
@@ -108,6 +109,7 @@ class SignatureSettings:
     floor: tuple[float, float, float, float] = (0.001, 0.0005, 0.001, 0.0003)
     plug_floor: float = 0.0002
     lag_std: float = 0.05  # [s] prior of the lag between P1 - P2 and position
+    stribeck_std: float = 0.01  # [1] prior of the friction that vanishes with speed
     size_weight: float = 5000.0  # blocks that the unit of a size rests on in the end
     sigma_min: float = 4e-4  # [1]
     # verification (2.3b)
