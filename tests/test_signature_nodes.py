@@ -160,17 +160,18 @@ def test_a_stored_trend_is_published_with_its_band_and_the_time_to_its_limit(
     processes.start('damadics_fd', 'detector', parameters(
         **QUICK, actuator=ACTUATOR, signature_folder=str(trend.path.parent)))
     await_chain(peer)
-    send(peer, columns | {'stamp': columns['stamp'] + NOW})
+    send(peer, dict(columns) | {'stamp': columns['stamp'] + NOW})
     first, last = signatures[0], signatures[-1]
     assert first.state == last.state == Signature.STATE_MONITOR, 'the reference was not taken up'
     assert first.theta.tolist() == learned['theta'][:4]
     for message in (first, last):
-        np.testing.assert_allclose(message.trend, SLOPES, atol=[2e-5, 0.1, 8e-4])
+        # the slope of 80 points over 20 days has 1/52 of their deviation per day
+        assert np.all(np.abs(np.subtract(message.trend, SLOPES)) < np.multiply(DEVIATIONS, 4 / 52))
         assert message.limit[0] == -0.1 and message.limit[2] == 3.0
         expected, earliest, latest = (np.array(values) / DAY for values in (
             message.time_to_limit, message.time_to_limit_earliest, message.time_to_limit_latest))
-        assert expected[0] == pytest.approx(100.0, rel=0.03)
-        assert expected[2] == pytest.approx(60.0, rel=0.03)
+        assert expected[0] == pytest.approx(100.0, rel=0.05)
+        assert expected[2] == pytest.approx(60.0, rel=0.05)
         for k in (0, 2):
             assert 0.9 * expected[k] < earliest[k] < expected[k] < latest[k] < 1.1 * expected[k]
         assert earliest[1] > 365.0, 'the preload does not move'
