@@ -17,7 +17,7 @@ from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from damadics_fd.core.alarm import NE107
 from damadics_fd.core.quality import EXPLANATIONS
 from damadics_fd.core.scada.estimator import estimator_for
-from damadics_fd.reference import Reference, ReferenceFileError, load_reference, save_reference
+from damadics_fd.reference import NoReferenceError, Reference, load_reference, save_reference
 from damadics_fd.ros import qos
 from damadics_fd.ros.commands import check_node_arguments
 from damadics_fd.ros.conversions import sample, write_estimate
@@ -65,8 +65,9 @@ class EstimatorNode(MonitoringNode):
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Begin afresh, with the reference where there is one."""
         self._core.reset()
-        if self._path and (done := self._load(self._path)):
-            self.get_logger().info(done[1])
+        if self._path:
+            done, text = self._load(self._path)
+            (self.get_logger().info if done else self.get_logger().warning)(text)
         return super().on_configure(state)
 
     def _take(self, measurement: Measurement) -> None:
@@ -102,8 +103,10 @@ class EstimatorNode(MonitoringNode):
         try:
             reference = load_reference(Path(path).expanduser(), self.actuator, self.settings)
             self._core.restore(reference.learned)
-        except (ReferenceFileError, ValueError) as problem:
-            return False, f'reference not loaded, the valve is learned: {problem}'
+        except NoReferenceError as problem:
+            return False, f'no reference, the valve is learned: {problem}'
+        except ValueError as problem:
+            return False, f'reference refused, the valve is learned: {problem}'
         return True, f'reference loaded: {path}, {reference.source}'
 
     def _save_service(self, request: Any, response: Any) -> Any:

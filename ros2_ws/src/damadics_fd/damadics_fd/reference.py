@@ -38,6 +38,10 @@ class ReferenceFileError(ValueError):
     """Tell why no reference could be loaded, one reason per slot."""
 
 
+class NoReferenceError(ReferenceFileError):
+    """There is none yet, which is how everything begins."""
+
+
 @dataclass(frozen=True)
 class Reference:
     """Hold what was learned, and where it comes from."""
@@ -95,8 +99,11 @@ def load_reference(path: Path | str, actuator: str, settings: Settings,
     :param settings: the settings it must have been learned with.
     :param now: present time [s since 1970]; the clock's where it is None.
     :return: the reference.
+    :raises NoReferenceError: where there is none.
     :raises ReferenceFileError: where neither slot is good, with the reason of each.
     """
+    if not any(_file(path, slot).exists() for slot in SLOTS):
+        raise NoReferenceError(f'none is kept yet in {path}')
     now = time.time() if now is None else now
     found: list[tuple[int, Reference]] = []
     reasons = []

@@ -12,7 +12,13 @@ import pytest
 from damadics_fd.core.estimator import Estimator
 from damadics_fd.core.pipeline import run
 from damadics_fd.core.settings import Settings
-from damadics_fd.reference import Reference, ReferenceFileError, load_reference, save_reference
+from damadics_fd.reference import (
+    NoReferenceError,
+    Reference,
+    ReferenceFileError,
+    load_reference,
+    save_reference,
+)
 
 from .synthetic import valve
 
@@ -95,9 +101,13 @@ def test_reference_from_the_future_is_refused(tmp_path, learned):
         load_reference(tmp_path / 'x', 'LV-101', SETTINGS, now=0.9e9)
 
 
-def test_no_reference_names_both_slots(tmp_path):
-    with pytest.raises(ReferenceFileError, match=r'x\.a\.json does not exist.*x\.b\.json'):
+def test_no_reference_is_told_from_two_damaged_slots(tmp_path):
+    with pytest.raises(NoReferenceError, match=r'none is kept yet in .*/x'):
         load_reference(tmp_path / 'x', 'LV-101', SETTINGS)
+    (tmp_path / 'x.b.json').write_text('{')
+    with pytest.raises(ReferenceFileError, match=r'x\.a\.json does not exist.*x\.b\.json') as bad:
+        load_reference(tmp_path / 'x', 'LV-101', SETTINGS)
+    assert not isinstance(bad.value, NoReferenceError)
 
 
 def test_failed_write_keeps_what_is_there(tmp_path, learned, monkeypatch):

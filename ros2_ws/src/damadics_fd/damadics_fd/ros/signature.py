@@ -15,7 +15,7 @@ from damadics_fd.advice import CauseTable, CauseTableError, load_causes
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.signature import Signature
 from damadics_fd.core.signature_decision import own_alarm_ready
-from damadics_fd.reference import Reference, load_reference, save_reference
+from damadics_fd.reference import NoReferenceError, Reference, load_reference, save_reference
 from damadics_fd.ros import qos
 from damadics_fd.ros.alarm_store import another_run
 from damadics_fd.ros.spin import StartError
@@ -76,8 +76,10 @@ class SignaturePublisher:
             self._saved = kept.signature
             self._restored = kept.last_stamp
             self._node.get_logger().info(f'signature of before taken up from {self._folder}')
+        except NoReferenceError:
+            self._node.get_logger().info(f'the signature is learned, and kept in {self._folder}')
         except ValueError as problem:
-            self._node.get_logger().info(f'the signature is learned anew: {problem}')
+            self._node.get_logger().warning(f'the signature is learned anew: {problem}')
 
     def begin(self, stamp: int) -> None:
         """
