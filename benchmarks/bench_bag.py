@@ -23,7 +23,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from damadics_fd.bag import BagWriter, iter_columns, read_columns, write_columns
+from damadics_fd.bag import BagWriter, iter_columns, loading, read_columns, write_columns
 from damadics_fd.bag.rosbag2 import qos
 from damadics_plant import simulate
 from numpy.typing import NDArray
@@ -72,17 +72,25 @@ def reading(folder: Path) -> None:
             for connection, _, raw in reader.messages():
                 reader.deserialize(raw, connection.msgtype).x1  # noqa: B018
 
-    own = spent(lambda: read_columns(large), 15) / ROWS
-    pieces = spent(lambda: [len(c['x1']) for c in iter_columns(large)], 15) / ROWS
+    def pieces() -> None:
+        for columns in iter_columns(large):
+            len(columns['x1'])
+
+    threads = loading.THREADS
+    readers = {'read_columns': lambda: read_columns(large), 'iter_columns': pieces}
+    measured = {}
+    for number in sorted({1, threads}):
+        loading.THREADS = number
+        measured |= {f'{name}, threads: {number}': spent(reader, 15) / ROWS
+                     for name, reader in readers.items()}
     peers = {'rosbags': rosbags, 'mcap + mcap-ros2-support': mcap_ros2}
-    measured = {'read_columns': own, 'iter_columns': pieces} | {
-        name: spent(peer, 3) / SLOW_ROWS for name, peer in peers.items()
-    }
-    print(f'{"reading /measurement":34}{"CPU us/message":>16}{"ratio":>8}'
-          f'{"wall us/message":>18}{"ratio":>8}')
-    for name, (cpu, wall) in measured.items():
-        print(f'{name:34}{cpu * 1e6:16.4f}{cpu / own[0]:8.1f}{wall * 1e6:18.4f}'
-              f'{wall / own[1]:8.1f}')
+    slow = {name: spent(peer, 3) / SLOW_ROWS for name, peer in peers.items()}
+    ratios = ''.join(f'{name.split(" ")[0] + " / it":>16}' for name in slow)
+    print(f'{"reading /measurement":34}{"CPU us/message":>16}{"wall us/message":>18}'
+          f'   ratios of CPU, wall:{ratios}')
+    for name, (cpu, wall) in (measured | slow).items():
+        print(f'{name:34}{cpu * 1e6:16.4f}{wall * 1e6:18.4f}' + ' ' * 23 + ''.join(
+            f'{peer[0] / cpu:8.1f}{peer[1] / wall:8.1f}' for peer in slow.values()))
     print(f'bag: {large.stat().st_size / ROWS:.1f} B/message')
 
 

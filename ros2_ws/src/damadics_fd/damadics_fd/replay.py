@@ -16,6 +16,7 @@ from typing import Any
 import yaml
 from tqdm import tqdm
 
+from damadics_fd.bag import loading
 from damadics_fd.bag.errors import BagError, NoMeasurementError
 from damadics_fd.bag.recording import Recording, find_recordings, parse_maps
 from damadics_fd.core.modes import MODES
@@ -29,7 +30,9 @@ EXAMPLES = """examples:
   ros2 run damadics_fd replay plant_bags/ --out alarms.csv
   ros2 run damadics_fd replay 17112001.txt --actuator 1 --mode scada
   ros2 run damadics_fd replay valve.mcap --map cv=/pos/setpoint.data*0.01 --map x1=/pos/stem.data
-  ros2 run damadics_fd replay bags/spring --live --rate 2"""
+  ros2 run damadics_fd replay bags/spring --live --rate 2
+
+exit code: 0 every recording gave a result, 1 one of them failed, 2 wrong command line"""
 BESIDE = Path()  # bags with the flags go next to the inputs
 WARNINGS = 3  # shown per recording
 _SUFFIX = re.compile(r'(\.mcap(\.zstd)?|\.csv|\.txt|\.tsv)$', re.IGNORECASE)
@@ -44,7 +47,9 @@ def arguments(args: list[str] | None = None) -> argparse.Namespace:
     )
     parser.add_argument('bags', nargs='+', metavar='BAG', type=Path,
                         help='MCAP file, bag directory, table (.csv, .txt), or folder of such')
-    parser.add_argument('--mode', choices=MODES, default='monitor')
+    parser.add_argument('--mode', choices=MODES, default='monitor',
+                        help='monitor: learn the valve, then watch it; needs ps (default). paper:'
+                        ' the method as printed. scada: slow signals of a control room')
     parser.add_argument('--settings', type=Path, metavar='FILE',
                         help='parameter file of the nodes (YAML)')
     parser.add_argument('--set', action='append', default=[], metavar='NAME=VALUE',
@@ -147,7 +152,7 @@ def main(args: list[str] | None = None) -> int:
             return max(code, report_errors(failed))
         outcomes = replay_all(recordings, plan, options.jobs)
         outcomes += [Outcome(str(error.path), plan.mode, error=str(error)) for error in failed]
-        if recordings:
+        if not all(outcome.error for outcome in outcomes):
             print_table(outcomes)
         for outcome in outcomes:
             report_problems(outcome.problems)
@@ -197,8 +202,9 @@ def replay_all(recordings: Sequence[Recording], plan: Plan, jobs: int) -> list[O
             return [replay(recording, where, bar.update, stem) for recording, where, stem in tasks]
         context = multiprocessing.get_context('spawn')
         counter = context.Value('q', 0)
+        workers = min(jobs, len(tasks))
         with ProcessPoolExecutor(
-            min(jobs, len(tasks)), context, initializer=_start, initargs=(counter, plan)
+            workers, context, initializer=_start, initargs=(counter, plan, workers)
         ) as pool:
             waiting = futures = [pool.submit(_work, *task) for task in tasks]
             while waiting:
@@ -228,9 +234,10 @@ def unique_stems(recordings: Sequence[Recording]) -> Iterator[str]:
         yield stem
 
 
-def _start(counter: Any, plan: Plan) -> None:
+def _start(counter: Any, plan: Plan, workers: int) -> None:
     global _counter
     _counter = counter
+    loading.THREADS = max(1, loading.THREADS // workers)  # the cores are busy
     warm_up([plan])
 
 

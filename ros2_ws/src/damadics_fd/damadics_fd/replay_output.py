@@ -28,11 +28,13 @@ def print_table(outcomes: Sequence[Outcome]) -> None:
         if not text:
             text = 'none' if outcome.status == 'monitoring' else f'none: {outcome.status}'
         refused = sum(outcome.refused.values())
+        if outcome.error:
+            rows.append((outcome.bag, outcome.mode, '', '', '', 'failed'))
+            continue
         rows.append((
             outcome.bag, outcome.mode, f'{outcome.samples:,}', f'{outcome.duration_s:.1f} s',
             f'{outcome.samples_per_s / 1e6:.2f} M',
-            'failed' if outcome.error
-            else text + (f'  ({refused} samples refused)' if refused else ''),
+            text + (f'  ({refused} samples refused)' if refused else ''),
         ))
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for row in rows:

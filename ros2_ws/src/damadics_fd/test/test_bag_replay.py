@@ -184,7 +184,7 @@ def test_errors_are_one_line_on_stderr(args, reason, tmp_path, capsys, monkeypat
 
 
 @pytest.mark.parametrize(('content', 'reason'), [
-    (None, 'holds no .mcap file; give a bag, or the folder right above bags'),
+    (None, 'holds no .mcap file; give a bag, or a folder of bags'),
     (b'PK\x03\x04 and so on', 'is a ZIP archive; unpack it first'),
     (b'\x1f\x8b and so on', 'is compressed by gzip; unpack it first'),
     (b'', 'is empty'),
@@ -238,6 +238,15 @@ def test_an_empty_topic_beside_a_full_one_is_told_and_passed_over(closed, tmp_pa
     assert result['bag'].endswith('#/v0/measurement')
     assert result['samples'] == 2000
     assert 'the topic /v1/measurement is empty; it is left out' in capsys.readouterr().err
+
+
+@needs_messages
+def test_loose_files_in_a_subfolder_are_not_taken_for_one_split_bag(tmp_path):
+    for name in ('week/a.mcap', 'week/b.mcap', 'month/day/c', 'split/s_0.mcap', 'split/s_1.mcap'):
+        write_columns(tmp_path / name, stroke(10))
+    (tmp_path / 'month/day/c/metadata.yaml').unlink()
+    found = [recording.path.relative_to(tmp_path) for recording in find_recordings([tmp_path])]
+    assert list(map(str, found)) == ['month/day/c', 'split', 'week/a.mcap', 'week/b.mcap']
 
 
 @needs_messages

@@ -57,7 +57,7 @@ def parse_maps(texts: Sequence[str]) -> dict[str, tuple[str, float]]:
         except ValueError:
             raise BagError(
                 f'--map {text}: write SIGNAL=/topic.field or SIGNAL=COLUMN, then *FACTOR;'
-                f' SIGNAL is one of {", ".join(SIGNALS)}'
+                f' SIGNAL is one of {", ".join(SIGNALS)}; in a table also t'
             ) from None
     return maps
 

@@ -44,7 +44,7 @@ def bag_files(path: str | Path) -> list[Path]:
         foreign = next(path.glob('*.db3'), None)
         raise BagError(
             'is an SQLite bag; convert it: ros2 bag convert with storage_id mcap' if foreign
-            else 'holds no .mcap file; give a bag, or the folder right above bags', path,
+            else 'holds no .mcap file; give a bag, or a folder of bags', path,
         )
     return files
 
@@ -62,23 +62,25 @@ def find_bags(path: str | Path) -> list[Path]:
     """
     List the bags that a path names.
 
-    :param path: MCAP file, bag directory, or folder of such.
+    :param path: MCAP file, bag directory, or folder of such at any depth.
     :return: one path per bag; the files of a split bag count as one.
     :raises BagError: where there is none.
     """
     path = Path(path)
     if not path.is_dir():
         return [bag_files(path)[0]]
-    if (path / METADATA_FILE).is_file():
-        return [path]
-    folders = [
-        folder for folder in sorted(path.iterdir())
-        if folder.is_dir() and (any(map(is_mcap, folder.iterdir())))
-    ]
-    files = sorted(filter(is_mcap, path.iterdir()), key=_by_number)
-    split = len(files) > 1 and all(_by_number(file)[1] >= 0 for file in files)
-    if split and len({_by_number(file)[0] for file in files}) == 1:
-        return [path, *folders]  # a split bag without metadata.yaml
-    if not files and not folders:
-        return [path] if bag_files(path) else []
-    return [*files, *folders]
+    return _bags_within(path) or ([path] if bag_files(path) else [])
+
+
+def _bags_within(folder: Path) -> list[Path]:
+    if (folder / METADATA_FILE).is_file():
+        return [folder]
+    entries = sorted(folder.iterdir())
+    files = sorted(filter(is_mcap, entries), key=_by_number)
+    names = {_by_number(file)[0] for file in files}
+    numbered = len(names) == 1 and all(_by_number(file)[1] >= 0 for file in files)
+    if numbered and (len(files) > 1 or folder.name in names):
+        files = [folder]  # a split bag, or one that a crash left without metadata.yaml
+    inner = [entry for entry in entries if entry.is_dir() and not entry.is_symlink()
+             and not entry.name.startswith('.')]
+    return [*files, *(bag for entry in inner for bag in _bags_within(entry))]
