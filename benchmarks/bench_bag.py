@@ -85,12 +85,11 @@ def reading(folder: Path) -> None:
                      for name, reader in readers.items()}
     peers = {'rosbags': rosbags, 'mcap + mcap-ros2-support': mcap_ros2}
     slow = {name: spent(peer, 3) / SLOW_ROWS for name, peer in peers.items()}
-    ratios = ''.join(f'{name.split(" ")[0] + " / it":>16}' for name in slow)
-    print(f'{"reading /measurement":34}{"CPU us/message":>16}{"wall us/message":>18}'
-          f'   ratios of CPU, wall:{ratios}')
+    print(f'{"reading /measurement":28}{"CPU us/message":>16}{"wall":>8}' + ''.join(
+        f'{name.split(" ")[0] + ": CPU x":>18}{"wall x":>8}' for name in slow))
     for name, (cpu, wall) in (measured | slow).items():
-        print(f'{name:34}{cpu * 1e6:16.4f}{wall * 1e6:18.4f}' + ' ' * 23 + ''.join(
-            f'{peer[0] / cpu:8.1f}{peer[1] / wall:8.1f}' for peer in slow.values()))
+        print(f'{name:28}{cpu * 1e6:16.4f}{wall * 1e6:8.4f}' + ''.join(
+            f'{peer[0] / cpu:18.1f}{peer[1] / wall:8.1f}' for peer in slow.values()))
     print(f'bag: {large.stat().st_size / ROWS:.1f} B/message')
 
 

@@ -26,11 +26,11 @@ from damadics_fd.replay_output import check_format, make_folder, print_table, wr
 from damadics_fd.ros.commands import split_ros_args
 
 EXAMPLES = """examples:
-  ros2 run damadics_fd replay bags/friction --mode paper --figures figures --out result.json
+  ros2 run damadics_fd replay bags/dablib_friction.mcap --mode paper --figures figures
   ros2 run damadics_fd replay plant_bags/ --out alarms.csv
   ros2 run damadics_fd replay 17112001.txt --actuator 1 --mode scada
   ros2 run damadics_fd replay valve.mcap --map cv=/pos/setpoint.data*0.01 --map x1=/pos/stem.data
-  ros2 run damadics_fd replay bags/spring --live --rate 2
+  ros2 run damadics_fd replay bags/dablib_spring.mcap --live --rate 2
 
 exit code: 0 every recording gave a result, 1 one of them failed, 2 wrong command line"""
 BESIDE = Path()  # bags with the flags go next to the inputs

@@ -13,7 +13,7 @@ SHOWN = 10  # problems told one by one
 EXAMPLE = """exit code: 0 whole, 3 lossy, 1 unusable (the worst of all bags)
 
 example:
-  ros2 run damadics_fd verify bags/friction"""
+  ros2 run damadics_fd verify bags/dablib_friction.mcap"""
 
 
 def print_report(report: Report) -> None:

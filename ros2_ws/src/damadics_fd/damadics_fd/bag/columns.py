@@ -4,7 +4,7 @@
 Read a topic of a bag as columns, by whole chunks instead of message by message.
 
 >>> from damadics_fd.bag import read_columns
->>> columns = read_columns('bags/friction', '/measurement', ['cv', 'x1'])  # doctest: +SKIP
+>>> columns = read_columns('friction.mcap', '/measurement', ['cv', 'x1'])  # doctest: +SKIP
 >>> sorted(columns)                                                        # doctest: +SKIP
 ['cv', 'log_time', 'stamp', 'x1']
 """
