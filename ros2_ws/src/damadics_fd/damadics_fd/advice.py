@@ -19,6 +19,7 @@ from damadics_fd.trends import QUANTITIES
 NE107_NAMES = ('normal', 'maintenance', 'out_of_specification', 'function_check', 'failure')
 FIELDS = ('tag', 'value', 'margin', 'confidence', 'second')
 KEYS = ('text', 'advice', 'ne107')
+MOST_CERTAIN = 0.99  # no text promises 100 %
 
 
 class CauseTableError(ValueError):
@@ -62,7 +63,8 @@ class Cause:
         :return: text, advice.
         """
         words = {'tag': tag, 'value': _Number(value), 'margin': _Number(2.0 * std),
-                 'confidence': _Number(confidence), 'second': second.replace('_', ' ')}
+                 'confidence': _Number(min(confidence, MOST_CERTAIN)),
+                 'second': second.replace('_', ' ')}
         return self.text.format(**words), self.advice.format(**words)
 
 

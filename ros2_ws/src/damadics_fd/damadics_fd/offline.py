@@ -228,7 +228,7 @@ def _replay(
         _draw(thinner, recording, outcome, plan.figures / f'{stem}.png')
     if forces and plan.figures and chain.signature.view().state >= STATE_VERIFY:
         force_over_position(forces, chain.signature, plan.figures / f'{stem}_signature.png',
-                            Path(recording.name).name)
+                            Path(recording.name).name.removesuffix('.mcap'))
 
 
 def _judge_refused(outcome: Outcome, lacking: set[str]) -> None:

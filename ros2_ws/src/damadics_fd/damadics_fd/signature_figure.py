@@ -144,6 +144,10 @@ def force_over_position(force_map: ForceMap, signature: Signature, path: Path | 
         whole.set_title('force on the stem  [N]', loc='left')
         close.set_title('distance from the learned spring line  [N]', loc='left')
         close.axhline(0.0, color=GREY, linewidth=0.8)
+        lines, names = close.get_legend_handles_labels()
+        keep = [k for k, name in enumerate(names) if 'friction' in name]
+        close.legend([lines[k] for k in keep], [names[k] for k in keep], frameon=True,
+                     edgecolor='none', framealpha=0.85)
         handles, _ = whole.get_legend_handles_labels()
         if handles:
             whole.legend(loc='upper left', markerscale=2.0)
@@ -176,12 +180,9 @@ def _friction_lines(axis: Any, x: Array, middle: Array, band: float, color: str,
     """Draw the branches of a valve with this friction around its spring line."""
     if not np.isfinite(band):
         return
-    for side in (-1.0, 1.0):
-        axis.plot(x, middle + side * band, color=color, linewidth=1.1, linestyle=(0, (5, 3)))
-    axis.annotate(f'{label}: friction {band:.0f} N', (x[-1], middle[-1] + band), ha='right',
-                  va='bottom', color=color, fontsize=9, xytext=(0, 9),
-                  textcoords='offset points',
-                  bbox={'color': 'white', 'pad': 0.8, 'alpha': 0.85, 'linewidth': 0.0})
+    for side, name in ((-1.0, None), (1.0, f'{label}: friction {band:.0f} N')):
+        axis.plot(x, middle + side * band, color=color, linewidth=1.2, linestyle=(0, (5, 3)),
+                  label=name)
 
 
 def _spring_line(signature: Signature, x: Array, dp: Array) -> Array:

@@ -30,7 +30,7 @@ from damadics_fd.core.signature_types import (
     TABLE,
 )
 
-INFLATION = 4.0  # model error of the reference, as a factor on its variance
+INFLATION = 2.0  # model error of the reference, as a factor on its variance
 STICK_FLOOR = 0.005  # [1] lowest stick range to compare with
 GROWTH = 1.25  # of the record between two fits of the unit: a fault's first blocks seldom count
 
