@@ -164,8 +164,10 @@ class Keeper:
                 pause = self._pause[label]
                 self._pause[label] = min(2.0 * pause, LONGEST_PAUSE)
                 self._due[label] = now + pause
-                print(f'{label} ended with exit code {code}, again in {pause:g} s; its last words '
-                      f'are in {self._processes.log(label)}', file=sys.stderr, flush=True)
+                log = self._processes.log(label)
+                words = log.read_text(errors='replace').strip().splitlines()[-1:]
+                print(f'{label} ended with exit code {code}, again in {pause:g} s: '
+                      f'{words[0] if words else "no words"} ({log})', file=sys.stderr, flush=True)
 
     def _start(self, label: str) -> None:
         task = self._tasks[label]
