@@ -12,7 +12,7 @@ from typing import Any
 
 import rclpy
 from damadics_fd.ros import qos
-from damadics_fd.ros.clock_step import timers_kept_going
+from damadics_fd.ros.spin import spin_until
 from damadics_msgs.msg import Estimate, FaultEvent, FaultFlag, Float64Stamped, Measurement
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
@@ -158,9 +158,7 @@ class Watcher:
             self._node.create_subscription(
                 DiagnosticArray, '/diagnostics', self._take_diagnostics, profile
             )
-            with timers_kept_going([self._node]):
-                while rclpy.ok() and not self._stop.is_set():
-                    executor.spin_once(timeout_sec=0.1)
+            spin_until(lambda: self._stop.is_set() or not rclpy.ok(), executor, [self._node])
             executor.shutdown()
             self._node.destroy_node()
         except ExternalShutdownException:

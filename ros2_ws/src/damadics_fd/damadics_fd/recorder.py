@@ -18,10 +18,9 @@ from damadics_fd.bag.blackbox import BlackBox
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.spool import Spool
 from damadics_fd.bag.writer import BagWriter
-from damadics_fd.ros.clock_step import timers_kept_going
 from damadics_fd.ros.recording import Recorder
+from damadics_fd.ros.spin import spin_until
 
-SLICE = 0.02  # [s] between two looks at the signals
 QUIET = 0.02  # [s] without a message after which nothing is on its way any more
 LAST_WAIT = 0.12  # [s] at most, from the signal to the closing of the bag
 
@@ -102,12 +101,8 @@ def _spin(node: Recorder, spool: Spool, stop: list[int]) -> None:
     """Receive until a signal comes, then what is still on its way."""
     executor = EventsExecutor()
     executor.add_node(node)
+    spin_until(lambda: bool(stop), executor, [node])
     never: Future = Future()
-    with timers_kept_going([node]):
-        while not stop:
-            # takes many messages per call, where spin_once() returns after each; timed, because
-            # untimed waiting is broken in the wheels
-            executor.spin_until_future_complete(never, SLICE)
     end = time.monotonic() + LAST_WAIT
     received = -1
     while received != spool.received and time.monotonic() < end:

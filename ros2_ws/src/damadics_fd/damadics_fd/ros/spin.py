@@ -6,20 +6,22 @@ import gc
 import signal
 import sys
 from collections.abc import Callable, Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 import rclpy
+from rclpy.clock import Clock, ClockType
 from rclpy.experimental import EventsExecutor
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
 from damadics_fd.ros.clock_step import timers_kept_going
 
-SLICE = 0.05  # s between two looks at the signals
+LOOK = 0.1  # s between two looks at whether to end
+LONG = 3600.0  # s; a call costs 30 bytes that rclpy never frees
 
 
 class SpinnableNode(Protocol):
-    """What `spin` needs of a node."""
+    """What `spin` needs of a node beside what every node has."""
 
     finished: bool
     exit_code: int
@@ -30,6 +32,26 @@ class SpinnableNode(Protocol):
 
 class StartError(Exception):
     """A node refuses to start; the message names every cause and its remedy."""
+
+
+def spin_until(done: Callable[[], bool], executor: EventsExecutor, nodes: Sequence[Any]) -> None:
+    """
+    Let nodes work until there is a reason to end.
+
+    :param done: looked at ten times a second; a handler of signals may make it true.
+    :param executor: that has the nodes.
+    :param nodes: at least one.
+    """
+    steady = Clock(clock_type=ClockType.STEADY_TIME)
+    with timers_kept_going(nodes):
+        while not done():
+            ended: Future = Future()
+            timer = nodes[0].create_timer(
+                LOOK, lambda ended=ended: ended.set_result(None) if done() else None, clock=steady)
+            # Never untimed: an untimed spin of this executor does not return in some builds. Many
+            # callbacks a call, where spin_once returns after each.
+            executor.spin_until_future_complete(ended, LONG)
+            nodes[0].destroy_timer(timer)
 
 
 def spin(make_node: Callable[[], SpinnableNode], args: list[str] | None = None) -> int:
@@ -74,17 +96,13 @@ def spin_all(makers: Sequence[Callable[[], SpinnableNode]], args: list[str] | No
             nodes.append(make_node())
             executor.add_node(nodes[-1])
         ready = True
-        # Never untimed: an untimed spin of this executor does not return in some builds. Many
-        # callbacks a call, where spin_once returns after each.
-        never: Future = Future()
-        with timers_kept_going(nodes):
-            while nodes and not stop:
-                executor.spin_until_future_complete(never, SLICE)
-                for node in [node for node in nodes if node.finished]:
-                    exit_code = max(exit_code, node.exit_code)
-                    nodes.remove(node)
-                    executor.remove_node(node)
-                    node.destroy_node()
+        while nodes and not stop:
+            spin_until(lambda: bool(stop) or any(node.finished for node in nodes), executor, nodes)
+            for node in [node for node in nodes if node.finished]:
+                exit_code = max(exit_code, node.exit_code)
+                nodes.remove(node)
+                executor.remove_node(node)
+                node.destroy_node()
     except StartError as problem:
         print(problem, file=sys.stderr)
         return 1
