@@ -182,8 +182,8 @@ def test_signals_end_a_node_with_exit_code_0(domain, tmp_path, name, numbers):
             process.send_signal(number)
             time.sleep(0.005)
         began = time.monotonic()
-        assert process.wait(5.0) == 0
-        assert time.monotonic() - began < 2.0
+        assert process.wait(10.0) == 0
+        assert time.monotonic() - began < (4.0 if name == 'dashboard' else 2.0)
     finally:
         process.kill()
 
