@@ -109,11 +109,10 @@ def observe_printed(s: Any, c: Any, dt: float, x1_0: float, x2_0: float, u_0: fl
     Inputs and Phi run on straight lines from the sample before to this one. The error xi2 is
     therefore that before the observer has answered to the new sample; the implicit step of
     `observe` halves it, which delays the decision on the friction fault by one sample.
+    Where Phi has drifted so far that the step cannot resolve the boundary layer, it is widened.
 
     :param s: state record as in `observe`; phi is that of the sample before on entry.
     :param c: settings record.
-    Where Phi has drifted so far that the step cannot resolve the boundary layer, it is widened.
-
     :param dt: time step [s]; k2 dt must stay below 2.5.
     :param x1_0: position at the sample before [1].
     :param x2_0: velocity there [1/s].
