@@ -1,7 +1,7 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
 """
-Measure what the valve signature shows: isolation, small changes, drifts, false alarms, sensors.
+Measure what the valve signature shows: isolation, small, strong and slow changes, false alarms.
 
 Slow (an hour for `all` on one core), not part of `make test`. Each part prints a table and adds
 its figures to a JSON file:
@@ -49,7 +49,7 @@ def paper_cv(duration: float) -> Steps:
 
 
 def plant_run(seed: int, duration: float, model: str = 'lugre', faults: Iterable[Fault] = (),
-              cv: str = 'random', **constants: float) -> Columns:
+              cv: str | Steps = 'random', **constants: float) -> Columns:
     """Simulate one valve of a random build; see the module for its spread and noise."""
     rng = np.random.default_rng(seed)
     build: dict[str, float] = {'stiffness': 60892.0 * (1 + rng.uniform(-0.04, 0.04))}
@@ -62,8 +62,9 @@ def plant_run(seed: int, duration: float, model: str = 'lugre', faults: Iterable
         actuator = LuGreActuator(**{**build, **constants})
     else:
         actuator = Actuator(**{**build, **constants})
-    steps = RandomSteps(seed=seed) if cv == 'random' else paper_cv(duration)
-    scenario = Scenario('campaign', duration, cv=steps, faults=tuple(faults),
+    if isinstance(cv, str):
+        cv = RandomSteps(seed=seed) if cv == 'random' else paper_cv(duration)
+    scenario = Scenario('campaign', duration, cv=cv, faults=tuple(faults),
                         p1=Sine(3.5e6, 175e3, 0.1, phase[0]),
                         p2=Sine(2.6e6, 26e3, 1 / np.pi, phase[1]))
     columns = dict(simulate(scenario, RATE, actuator, noise='cv', seed=seed))
@@ -292,6 +293,45 @@ def healthy(runs: int) -> dict[str, Any]:
             'largest kappa': max(kappa), 'lowest filling rate': round(float(np.nanmin(fill)), 3)}
 
 
+def later_pattern(kind: str, seed: int, start: float, end: float) -> Steps:
+    """Return random steps until `start`, then another pattern of the CV."""
+    rng = np.random.default_rng(seed)
+    times, values = [0.0], [0.5]
+
+    def hold(seconds: float, value: float) -> None:
+        times.append(times[-1] + seconds)
+        values.append(float(np.clip(value, 0.0, 1.0)))
+
+    while times[-1] < start:
+        hold(rng.uniform(5, 15), rng.uniform())
+    while times[-1] < end:
+        if kind == 'small steps':
+            hold(rng.uniform(4, 8), np.clip(values[-1] + rng.uniform(-0.12, 0.12), 0.1, 0.9))
+        elif kind == 'slow ramps':
+            for value in np.linspace(values[-1], rng.uniform(0.05, 0.95), 40)[1:]:
+                hold(0.5, value)
+        elif kind == 'full strokes':
+            hold(12.0, float(values[-1] < 0.5))
+        else:
+            hold(rng.uniform(5, 15), rng.uniform(0, 0.4) + 0.6 * (kind == 'upper 40 %'))
+    return Steps(times, values)
+
+
+def patterns(runs: int) -> dict[str, Any]:
+    """Watch fault-free valves under another pattern of the CV than they were learned under."""
+    rows = []
+    for kind in ('small steps', 'slow ramps', 'full strokes', 'lower 40 %', 'upper 40 %'):
+        alarms, worst = 0, []
+        for k in tqdm(range(runs), desc=kind):
+            result = run(plant_run(20000 + k, 700.0, 'dablib' if k % 4 == 3 else 'lugre',
+                                   cv=later_pattern(kind, 20000 + k, 200.0, 700.0)), SETTINGS)
+            alarms += bool(result.detections)
+            worst.append(float(result.detector.signature.state[0].d_max.max()))
+        rows.append({'CV from 200 s on': kind, 'runs with an alarm': f'{alarms}/{runs}',
+                     'largest D, p90 max': np.round(np.quantile(worst, [0.9, 1]), 1).tolist()})
+    return {'rows': rows}
+
+
 def day(hours: int) -> dict[str, Any]:
     """One valve for a day without a fault, simulated and judged hour by hour."""
     from damadics_fd.core.detector import Detector
@@ -448,8 +488,9 @@ def cost(_: int) -> dict[str, Any]:
 
 PARTS: dict[str, tuple[Callable[[int], dict[str, Any]], int]] = {
     'isolation': (isolation, 34), 'small': (small, 30), 'strong': (strong, 32),
-    'drift': (drift, 10), 'healthy': (healthy, 200), 'day': (day, 24), 'plug': (plug, 25),
-    'sensors': (sensors, 8), 'supply': (supply, 10), 'cost': (cost, 1)}
+    'drift': (drift, 10), 'healthy': (healthy, 200), 'patterns': (patterns, 30),
+    'day': (day, 24), 'plug': (plug, 25), 'sensors': (sensors, 8), 'supply': (supply, 10),
+    'cost': (cost, 1)}
 
 
 def main() -> None:

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from damadics_fd.core import signature_types as st
 from damadics_fd.core.signature import Signature
+from damadics_fd.core.signature_air import strokes_agree
 from damadics_fd.core.signature_step import BLOCK, CHANGED, QUIET
 from damadics_fd.core.signature_types import CAUSES, SignatureSettings
 
@@ -193,6 +194,14 @@ def test_missing_samples_cost_blocks_not_truth():
     signature, results = run(columns, keep=half)
     assert signature.view().state in (st.STATE_LEARN, st.STATE_INSUFFICIENT)
     assert np.all(results == QUIET) or np.mean(results == BLOCK) < 0.01
+
+
+def test_slow_ramps_are_not_taken_for_a_loss_of_supply():
+    s = Signature(C).state[0]
+    s.air_ring[st.FILL] = 0.88, 0.87, 0.86, 0.89, 0.88
+    assert strokes_agree(s)
+    s.air_ring[st.FILL] = 0.80, 0.64, 0.87, 0.77, 0.63  # the positioner did not open fully
+    assert not strokes_agree(s)
 
 
 def test_no_chamber_pressure_no_signature():

@@ -15,6 +15,7 @@ from damadics_fd.core.jit import jit
 from damadics_fd.core.signature_types import FILL, STROKES, VENT
 
 P_ATM = 101325.0  # [Pa]
+ALIKE = 0.9  # [1] strokes at full opening differ by 4 % at most, those of ramps by 10 to 40 %
 P_FLOOR = 5e3  # [Pa] less driving pressure than this says nothing
 MIN_STROKE = 0.15  # [1] a shorter stroke may not reach its top rate; holding against P1 does not
 
@@ -108,6 +109,22 @@ def supply_lost(s: Any, c: Any) -> bool:
         and abs(s.air_rate[VENT] - 1.0) < 0.5 * c.material_supply
     )
     return lost
+
+
+@jit
+def strokes_agree(s: Any) -> bool:
+    """
+    Tell whether the latest strokes filled the chamber alike, as they do at full opening.
+
+    :param s: state record; the ring of filling rates is full.
+    :return: False where the positioner followed slow ramps, which never open it.
+    """
+    low = high = s.air_ring[FILL, 0]
+    for i in range(1, STROKES):
+        low = min(low, s.air_ring[FILL, i])
+        high = max(high, s.air_ring[FILL, i])
+    agree: bool = low > ALIKE * high
+    return agree
 
 
 @jit

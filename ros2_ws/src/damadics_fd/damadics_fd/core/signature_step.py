@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from damadics_fd.core.jit import jit, layer
-from damadics_fd.core.signature_air import supply_lost, track_air
+from damadics_fd.core.signature_air import strokes_agree, supply_lost, track_air
 from damadics_fd.core.signature_alarm import (
     end_alarm,
     restart_sets,
@@ -219,7 +219,8 @@ def judge(s: Any, c: Any) -> int:
             decide(s, c)
         if s.state == STATE_VERIFY:
             finish_verification(s, c)
-        elif air and s.state == STATE_MONITOR and c.own_alarm != 0 and supply_lost(s, c):
+        elif (air and s.state == STATE_MONITOR and c.own_alarm != 0 and supply_lost(s, c)
+              and strokes_agree(s)):
             start_supply_alarm(s, c)
     return CHANGED if s.state * 10000 + s.family * 100 + s.cause != before else BLOCK
 
