@@ -5,9 +5,10 @@
 import numpy as np
 import pytest
 from damadics_fd import thinning
-from damadics_fd.core.detector import DECISION, Detector
+from damadics_fd.core.detector import Detector
 from damadics_fd.core.estimation import ESTIMATE
 from damadics_fd.core.estimator import Estimator
+from damadics_fd.core.judgement import DECISION
 from damadics_fd.core.pipeline import Result, run
 from damadics_fd.core.settings import Settings
 from damadics_fd.figures import envelope, six_panels

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 
 from damadics_fd.core import estimation
 from damadics_fd.core.alarm import RAISED
-from damadics_fd.core.detector import DECISION, Decision, Detector
+from damadics_fd.core.detector import Decision, Detector
 from damadics_fd.core.estimation import ESTIMATE
 from damadics_fd.core.estimator import Estimator
 from damadics_fd.core.events import Event, events_of
 from damadics_fd.core.jit import jit
+from damadics_fd.core.judgement import DECISION
 from damadics_fd.core.quality import REASONS, SIGNALS
 from damadics_fd.core.scada.estimator import ScadaEstimator, estimator_for
 from damadics_fd.core.settings import Settings
