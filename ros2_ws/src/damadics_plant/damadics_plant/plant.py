@@ -168,7 +168,8 @@ class Plant(Node):
     def destroy_node(self) -> None:
         """Let subscribers take the end of a scenario, then go."""
         if self.finished:
-            self._measurement.wait_for_all_acked(rclpy.duration.Duration(seconds=2.0))
+            for publisher in (self._fault_state, self._measurement):
+                publisher.wait_for_all_acked(rclpy.duration.Duration(seconds=2.0))
         super().destroy_node()
 
 
