@@ -24,12 +24,12 @@ test: $(BUILT) ## run all tests
 	@$(ENV) && python -m pytest -m 'not slow' -o pythonpath=tests $(ARGS)
 
 report: $(BUILT) ## the benchmark's 44 scenarios x all detectors: docs/results/ (minutes; more: SEEDS=20)
-	@$(ENV) && ros2 run damadics_fd evaluate run --out results/campaign --seeds $(SEEDS) --no-report \
-		&& ros2 run damadics_fd evaluate paper results/campaign \
-		&& ros2 run damadics_fd evaluate report results/campaign --to docs/results
+	@$(ENV) && ros2 run damadics_evaluate evaluate run --out results/campaign --seeds $(SEEDS) --no-report \
+		&& ros2 run damadics_evaluate evaluate paper results/campaign \
+		&& ros2 run damadics_evaluate evaluate report results/campaign --to docs/results
 
 campaign-monitor: $(BUILT) ## false alarms, delays, masking, sample rates of mode monitor (an hour)
-	@$(ENV) && python benchmarks/monitor_campaign.py $(ARGS)
+	@$(ENV) && python -m damadics_evaluate.monitor_campaign $(ARGS)
 
 build: $(BUILT) ## set up .venv and build the ROS 2 workspace
 

@@ -96,7 +96,7 @@ def reading(folder: Path) -> None:
 def replaying(folder: Path) -> None:
     """Read, decode, estimate, detect on one core."""
     from damadics_fd.bag.recording import Recording
-    from damadics_fd.offline import Plan, replay, warm_up
+    from damadics_fd.commands.replay.bags import Plan, replay, warm_up
 
     source = Recording(folder / 'large.mcap')
     print(f'\n{"whole replay":20}{"M samples/s and core":>22}{"day at 200 Hz":>16}'
@@ -120,7 +120,7 @@ def memory(folder: Path) -> None:
                 later = part * SLOW_ROWS * round(1e9 / RATE)
                 bag.write_columns(stamp + later, {'/measurement': columns}, 'LC74_20')
         code = (
-            'import sys, resource; from damadics_fd.replay import main;'
+            'import sys, resource; from damadics_fd.commands.replay.replay import main;'
             'main([sys.argv[1], "--mode", "monitor", "--figures", sys.argv[2]]);'
             'print("peak", resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3)'
         )
@@ -167,7 +167,7 @@ def recorder(folder: Path, options: argparse.Namespace) -> None:
     burners = [subprocess.Popen([sys.executable, '-S', '-c', 'while True: pass'])
                for _ in range(options.burners)]
     node = subprocess.Popen(
-        ['nice', '-n', str(options.nice), sys.executable, '-m', 'damadics_fd.recorder', '--out',
+        ['nice', '-n', str(options.nice), sys.executable, '-m', 'damadics_fd.commands.record', '--out',
          str(bag)], env=env,
     )
     time.sleep(3.0 + options.burners)

@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from damadics_fd.core.detector import Detector
-from damadics_fd.core.estimator import Estimator
+from damadics_fd.core.approximator.estimator import Estimator
+from damadics_fd.core.decision.detector import Detector
 from damadics_fd.core.pipeline import run
 from damadics_fd.core.settings import Settings
 

@@ -172,7 +172,7 @@ def test_the_real_plant_gives_no_alarm_and_a_stuck_stem_one(domain, tmp_path):
 def test_the_report_compares_with_what_else_there_is(tmp_path, chromium, monkeypatch):
     pytest.importorskip('filterpy')
     pytest.importorskip('river')
-    evaluate = executable('damadics_fd', 'evaluate')
+    evaluate = executable('damadics_evaluate', 'evaluate')
     campaign = ['run', '--out', str(tmp_path), '--scenarios', 'f16_B', '--detectors', 'scada',
                 'cusum', 'ekf', 'adwin', '--calibration-days', '1', '--isolated-seeds', '0']
     monkeypatch.setenv('DAMADICS_FD_CACHE', str(tmp_path / 'cache'))

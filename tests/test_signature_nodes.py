@@ -8,13 +8,13 @@ long a stored trend takes to its limit.
 import numpy as np
 import pytest
 from damadics_bringup.processes import parameters
-from damadics_fd.core.alarm import NE107
+from damadics_fd.core.decision.alarm import NE107
 from damadics_fd.core.pipeline import run
 from damadics_fd.core.settings import Settings
-from damadics_fd.core.signature_types import CAUSES, known
-from damadics_fd.reference import Reference, save_reference
+from damadics_fd.core.signature.state import CAUSES, known
 from damadics_fd.ros import qos
-from damadics_fd.trends import TrendFile, series_name
+from damadics_fd.store.references import Reference, save_reference
+from damadics_fd.store.trends import TrendFile, series_name
 from damadics_msgs.msg import FaultEvent, FaultFlag, Float64Stamped, Measurement, Signature
 from damadics_plant import simulate
 from diagnostic_msgs.msg import DiagnosticArray

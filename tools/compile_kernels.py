@@ -12,8 +12,8 @@ SAMPLE = {'cv': 0.5, 'x1': 0.5, 'p1': 3.5e6, 'p2': 2.6e6, 't1': 20.0, 'flow': 5.
 
 def detector() -> None:
     """Compile what judges an estimate; the longest of all."""
-    from damadics_fd.core.detector import Detector
-    from damadics_fd.core.estimator import Estimate
+    from damadics_fd.core.approximator.estimator import Estimate
+    from damadics_fd.core.decision.detector import Detector
     from damadics_fd.core.settings import Settings
 
     fields = len(Estimate._fields)
@@ -22,8 +22,8 @@ def detector() -> None:
 
 def the_others() -> None:
     """Compile estimator, reader of bags and plant."""
-    from damadics_fd.bag import kernels
-    from damadics_fd.core.estimator import Estimator
+    from damadics_fd.bag.cdr import kernels
+    from damadics_fd.core.approximator.estimator import Estimator
     from damadics_fd.core.settings import Settings
     from damadics_plant import simulate
 

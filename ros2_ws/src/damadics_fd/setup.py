@@ -8,7 +8,7 @@ setup(
     name=package,
     version='0.1.0',
     packages=find_packages(exclude=['test']),
-    package_data={package: ['py.typed', '*.yaml', 'evaluate/*.j2']},
+    package_data={package: ['py.typed', '*.yaml']},
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/' + package]),
         ('share/' + package, ['package.xml']),
@@ -22,21 +22,19 @@ setup(
     extras_require={
         'test': ['pytest', 'hypothesis'],
         'progpy': ['progpy'],  # test only: an independent plant
-        'evaluate': ['jinja2', 'matplotlib', 'river', 'filterpy', 'scikit-learn'],
-        'cluster': ['dask[distributed]'],
         'parquet': ['pyarrow'],
     },
     entry_points={
         'console_scripts': [
-            'estimator = damadics_fd.estimator:main',
-            'detector = damadics_fd.detector:main',
-            'monitors = damadics_fd.monitors:main',
-            'recorder = damadics_fd.recorder:main',
-            'evaluate = damadics_fd.evaluate:main',
-            'replay = damadics_fd.replay:main',
-            'verify = damadics_fd.verify:main',
-            'recover = damadics_fd.recover:main',
-            'commission = damadics_fd.commission:main',
+            'estimator = damadics_fd.nodes.estimator_node:main',
+            'detector = damadics_fd.nodes.detector_node:main',
+            'monitors = damadics_fd.nodes.monitors:main',
+            'recorder = damadics_fd.commands.record:main',
+            'evaluate = damadics_fd.commands.evaluate:main',
+            'replay = damadics_fd.commands.replay.replay:main',
+            'verify = damadics_fd.commands.verify:main',
+            'recover = damadics_fd.commands.recover:main',
+            'commission = damadics_fd.commands.commission:main',
         ],
     },
 )

@@ -7,7 +7,7 @@ import json
 import sys
 from pathlib import Path
 
-from damadics_fd.figures import six_panels
+from damadics_fd.figures.panels import six_panels
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from damadics_fd.bag.columns import read_columns
-from damadics_fd.core.alarm import RAISED
+from damadics_fd.core.decision.alarm import RAISED
 from damadics_fd.core.pipeline import Result, run
 from damadics_fd.core.settings import Settings
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ament_index_python.packages import get_package_share_directory
-from damadics_fd.ros.commands import command_parser, state_folder
+from damadics_fd.ros.arguments import command_parser, state_folder
 
 from damadics_bringup.fleet import MONITORS, FleetError, Valve, read_fleet, spread
 from damadics_bringup.processes import ProcessError, Processes, assignments

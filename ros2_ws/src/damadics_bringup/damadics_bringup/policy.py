@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from damadics_fd.ros.commands import command_parser
+from damadics_fd.ros.arguments import command_parser
 
 from damadics_bringup.fleet import MONITORS, FleetError, Valve, read_fleet, spread
 

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from damadics_fd.ros.commands import command_parser, split_ros_args, state_folder
+from damadics_fd.ros.arguments import command_parser, split_ros_args, state_folder
 
 from damadics_dashboard.access import AccessError, Guard, check_binding
 

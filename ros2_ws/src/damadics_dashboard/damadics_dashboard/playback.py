@@ -7,16 +7,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from damadics_fd.advice import load_causes
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.recording import Recording, find_recordings
-from damadics_fd.core.detector import Detector
-from damadics_fd.core.events import Event
+from damadics_fd.causes import load_causes
+from damadics_fd.commands.replay.bags import joined
+from damadics_fd.core.decision.detector import Detector
+from damadics_fd.core.decision.events import Event
 from damadics_fd.core.pipeline import run
 from damadics_fd.core.scada.estimator import estimator_for
 from damadics_fd.core.settings import Settings
-from damadics_fd.offline import joined
-from damadics_fd.thinning import Thinner
+from damadics_fd.figures.decimation import Thinner
 from numpy.typing import NDArray
 
 from damadics_dashboard.plots import BLOCK, SMALLEST

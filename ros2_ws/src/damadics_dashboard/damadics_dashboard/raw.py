@@ -6,8 +6,8 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from damadics_fd.bag.cdr import Layout, layout_of
-from damadics_fd.bag.definition import Definition, parse_definition, schema_text
+from damadics_fd.bag.cdr.definition import Definition, parse_definition, schema_text
+from damadics_fd.bag.cdr.layout import Layout, layout_of
 from numpy.typing import NDArray
 
 from damadics_dashboard.traces import NANO

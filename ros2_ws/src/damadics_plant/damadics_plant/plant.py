@@ -9,9 +9,9 @@ from typing import Any
 
 import rclpy
 from builtin_interfaces.msg import Time
-from damadics_fd.bag.cdr import stamped_encoder
+from damadics_fd.bag.cdr.layout import stamped_encoder
 from damadics_fd.ros import qos
-from damadics_fd.ros.commands import check_node_arguments
+from damadics_fd.ros.arguments import check_node_arguments
 from damadics_fd.ros.parameters import Parameters
 from damadics_fd.ros.spin import spin
 from damadics_msgs.msg import FaultState, Measurement

@@ -45,7 +45,7 @@ def open_writer(path: Path) -> Iterator[Write]:
 
 
 def _mcap(path: Path) -> Iterator[Write]:
-    from damadics_fd.bag.definition import schema_text
+    from damadics_fd.bag.cdr.definition import schema_text
     from damadics_fd.bag.rosbag2 import qos
     from damadics_fd.bag.writer import BagWriter
 

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from damadics_fd.bag.cdr.definition import schema_text
 from damadics_fd.bag.columns import read_columns
-from damadics_fd.bag.definition import schema_text
 from damadics_fd.bag.errors import BagError
 from damadics_plant import CATALOGUE, campaign, figures, scenario_names, simulate
 from damadics_plant.command import main

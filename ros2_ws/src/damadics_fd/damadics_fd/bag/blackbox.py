@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from damadics_fd.bag.cdr import layout_of
-from damadics_fd.bag.definition import parse_definition, schema_text
+from damadics_fd.bag.cdr.definition import parse_definition, schema_text
+from damadics_fd.bag.cdr.layout import layout_of
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.rosbag2 import QosProfile, Topic
 from damadics_fd.bag.writer import NANO, BagWriter

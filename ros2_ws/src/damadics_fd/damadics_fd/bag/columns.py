@@ -15,11 +15,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from damadics_fd.bag import kernels
-from damadics_fd.bag.decoder import Columns, Decoder, join
+from damadics_fd.bag.cdr import kernels
+from damadics_fd.bag.cdr.decoder import Columns, Decoder, join
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.limits import Limits
-from damadics_fd.bag.reader import McapFile
+from damadics_fd.bag.mcap.reader import McapFile
 from damadics_fd.bag.sources import bag_files
 
 kernels.warm_up()  # here rather than with the first file

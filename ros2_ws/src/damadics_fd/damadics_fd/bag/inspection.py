@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from damadics_fd.bag.crc import crc32
-from damadics_fd.bag.decoder import Decoder
+from damadics_fd.bag.cdr.decoder import Decoder
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.limits import Limits
-from damadics_fd.bag.reader import Batch, McapFile
-from damadics_fd.bag.records import HEAD, Op
+from damadics_fd.bag.mcap.crc import crc32
+from damadics_fd.bag.mcap.reader import Batch, McapFile
+from damadics_fd.bag.mcap.records import HEAD, Op
 from damadics_fd.bag.sources import bag_files
 
 WHOLE, UNUSABLE, LOSSY = 0, 1, 3  # exit codes, as those of `mcap recover`

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from damadics_fd.bag.cdr.decoder import Columns
 from damadics_fd.bag.columns import iter_columns, open_files, read_columns
-from damadics_fd.bag.decoder import Columns
 from damadics_fd.bag.errors import BagError, NoMeasurementError
 from damadics_fd.bag.sources import find_bags
 from damadics_fd.bag.tables import Table, read_table

@@ -11,8 +11,8 @@ from damadics_fd.bag import inspection
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.inspection import Report
 from damadics_fd.bag.limits import Limits
-from damadics_fd.bag.mcap_writer import McapWriter
-from damadics_fd.bag.reader import Batch, McapFile
+from damadics_fd.bag.mcap.reader import Batch, McapFile
+from damadics_fd.bag.mcap.writer import McapWriter
 from damadics_fd.bag.rosbag2 import METADATA_FILE, BagFile, BagMetadata, Topic
 from damadics_fd.bag.sources import bag_files
 from damadics_fd.bag.writer import WholeWrites

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from damadics_fd.bag.cdr import stamped_encoder
-from damadics_fd.bag.definition import schema_text, type_hash
+from damadics_fd.bag.cdr.definition import schema_text, type_hash
+from damadics_fd.bag.cdr.layout import stamped_encoder
 from damadics_fd.bag.errors import BagError
-from damadics_fd.bag.mcap_writer import CHUNK_SIZE, LEVEL, McapWriter
+from damadics_fd.bag.mcap.writer import CHUNK_SIZE, LEVEL, McapWriter
 from damadics_fd.bag.rosbag2 import (
     METADATA_FILE,
     BagFile,

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from damadics_fd.core import estimation
-from damadics_fd.core.alarm import RAISED
-from damadics_fd.core.detector import Decision, Detector
-from damadics_fd.core.estimation import ESTIMATE
-from damadics_fd.core.estimator import Estimator
-from damadics_fd.core.events import Event, events_of
+from damadics_fd.core.approximator import step as estimation
+from damadics_fd.core.approximator.estimator import Estimator
+from damadics_fd.core.approximator.step import ESTIMATE
+from damadics_fd.core.decision.alarm import RAISED
+from damadics_fd.core.decision.detector import Decision, Detector
+from damadics_fd.core.decision.events import Event, events_of
+from damadics_fd.core.decision.judge import DECISION
 from damadics_fd.core.jit import jit
-from damadics_fd.core.judgement import DECISION
 from damadics_fd.core.quality import REASONS, SIGNALS
 from damadics_fd.core.scada.estimator import ScadaEstimator, estimator_for
 from damadics_fd.core.settings import Settings

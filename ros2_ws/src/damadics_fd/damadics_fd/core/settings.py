@@ -10,8 +10,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from damadics_fd.core.field import choice, number, problem_of, switch, wrong_choice
 from damadics_fd.core.modes import MODES
-from damadics_fd.core.setting import choice, number, problem_of, switch, wrong_choice
 
 VELOCITIES = ('high_pass', 'kalman', 'super_twisting')
 THRESHOLDS = ('paper', 'floor')

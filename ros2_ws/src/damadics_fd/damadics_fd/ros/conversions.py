@@ -6,9 +6,9 @@ from builtin_interfaces.msg import Time
 from damadics_msgs.msg import Estimate as EstimateMessage
 from damadics_msgs.msg import FaultEvent, FaultFlag, Measurement
 
-from damadics_fd.core.detector import Decision
-from damadics_fd.core.estimator import Estimate
-from damadics_fd.core.events import Event
+from damadics_fd.core.approximator.estimator import Estimate
+from damadics_fd.core.decision.detector import Decision
+from damadics_fd.core.decision.events import Event
 
 NANO = 1_000_000_000
 MEASURED = ('cv', 'x1', 'p1', 'p2', 't1', 'flow', 'ps')

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from damadics_fd.core import quality
-from damadics_fd.core.estimation import Estimate
-from damadics_fd.core.estimator import Estimator
+from damadics_fd.core.approximator.estimator import Estimator
+from damadics_fd.core.approximator.step import Estimate
 from damadics_fd.core.modes import PHASE_HOLD, PHASE_INIT, PHASE_LEARN_PHI, PHASE_MONITOR
 from damadics_fd.core.scada.actuator import Actuator
 from damadics_fd.core.scada.monitor import ScadaMonitor

@@ -1,0 +1,79 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""What every detector of a campaign offers: fit to a fault-free hour, give a statistic."""
+
+import importlib
+from abc import ABC, abstractmethod
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from damadics_evaluate.indices import T_ON
+
+Floats = NDArray[np.float64]
+T, CV, X, P1, P2, T1, F = range(7)
+PACKAGES = {'sklearn': 'scikit-learn', 'river': 'river', 'filterpy': 'filterpy'}
+
+
+class MissingPackageError(ImportError):
+    """A baseline's library is not installed; the message tells how to get it."""
+
+
+def require(module: str, detector: str) -> Any:
+    """
+    Import a library that only a baseline needs.
+
+    :param module: module name, such as 'river.drift'.
+    :param detector: detector that asks for it.
+    :return: the module.
+    :raises MissingPackageError: naming the package and the command that installs it.
+    """
+    try:
+        return importlib.import_module(module)
+    except ImportError as error:
+        package = PACKAGES.get(module.split('.', 1)[0], module)
+        raise MissingPackageError(
+            f'detector {detector} needs {package}: pip install {package}, '
+            f'or leave it out with --detectors'
+        ) from error
+
+
+class Detector(ABC):
+    """
+    One detector under test.
+
+    Rows of samples are t (s), CV, X', P1', P2', T1', F', scaled to 0..1. The detector flags
+    while its statistic is at or above its limit; a campaign sets the limit (`calibrated`).
+    """
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    calibrated: ClassVar[bool] = True  # the limit comes from nominal days, else it is 1
+    t_on: float = T_ON
+    learn_from: float = 60.0
+
+    @abstractmethod
+    def fit(self, hour: Floats) -> None:
+        """Learn from a fault-free record."""
+
+    @abstractmethod
+    def statistic(self, samples: Floats) -> Floats:
+        """Return the statistic, one per row; anything below the limit while it starts up."""
+
+    def settings(self) -> dict[str, Any]:
+        """Return the plain numbers that shape the detector, for the settings hash."""
+        return {
+            key: value
+            for key, value in vars(self).items()
+            if not key.startswith('_') and isinstance(value, bool | int | float | str | tuple)
+        }
+
+    def learning_rows(self, hour: Floats) -> Floats:
+        """Return the rows after the start-up transient of the plant."""
+        return np.asarray(hour[hour[:, T] - hour[0, T] >= self.learn_from])
+
+    def active(self, samples: Floats) -> NDArray[np.bool_]:
+        """Return where tests are on: after the set-up zone."""
+        mask: NDArray[np.bool_] = samples[:, T] - samples[0, T] >= self.t_on
+        return mask

@@ -1,0 +1,184 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""The paper's experiments for all detectors: detection instant and alarms before the fault."""
+
+import base64
+import json
+import tempfile
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from damadics_fd.core.pipeline import Result, run
+from damadics_fd.core.scada.monitor import scada_samples
+from damadics_fd.core.scada.settings import ScadaSettings
+from damadics_fd.core.settings import Settings
+from numpy.typing import NDArray
+
+from damadics_evaluate.baselines import DETECTORS, MissingPackageError
+from damadics_evaluate.baselines.base import Floats
+from damadics_evaluate.baselines.kalman import FrictionSpringEkf
+from damadics_evaluate.baselines.scada import Scada
+from damadics_evaluate.trajectories import NOISE
+
+RUNS = ('paper_nominal', 'paper_friction', 'paper_spring')
+FAULT_AT = 70.0
+RATE = 200.0
+LEARN_UNTIL = 60.0
+SETTLED = 5.0
+CALIBRATION = 3  # fault-free runs of the paper's profile that set the limits of the baselines
+MARGIN = 1.1
+REPEATS = 8  # of the paper's CV profile, for the hour the SCADA-rate monitor learns from
+COLUMNS = (
+    'friction: detected at (s)', 'spring: detected at (s)', 'alarms before the fault',
+    'alarms in the fault-free run',
+)  # fmt: skip
+TEXT = (
+    'CV profile of Figs. 5(f) and 6(f), faults at 70 s. Paper mode at 400 Hz without noise, as '
+    'published: 81.12 and 70.005 s. All others with benchmark noise at 200 Hz; the SCADA-rate '
+    'monitor sees 1 Hz. The limits of the baselines are 1.1 times their largest value in three '
+    'fault-free runs of the same profile. Monitor mode and the EKF with states get the chamber '
+    'pressure.'
+)
+Alarms = NDArray[np.float64]  # instants of rising edges, s
+
+
+@dataclass(frozen=True)
+class Row:
+    """What one detector made of the three runs: instants of its alarms."""
+
+    title: str
+    alarms: Mapping[str, Alarms]
+
+    def cells(self) -> list[str]:
+        """Return the cells of the table."""
+        first = []
+        before = []
+        for name in RUNS[1:]:
+            at = self.alarms[name]
+            late = at[at >= FAULT_AT - 1e-9]
+            first.append(f'{late[0]:.3f}' if len(late) else 'not detected')
+            before.append(str(int((at < FAULT_AT - 1e-9).sum())))
+        return [self.title, *first, ' / '.join(before), str(len(self.alarms[RUNS[0]]))]
+
+
+def write_paper(directory: Path) -> Path:
+    """
+    Run the paper's experiments and keep table and figures for the report.
+
+    :param directory: of the campaign.
+    :return: file written.
+    """
+    from damadics_plant import simulate
+
+    rows, figures = [], []
+    clean = {name: simulate(name, rate=400.0) for name in RUNS}
+    results = {name: run(clean[name], Settings.for_mode('paper')) for name in RUNS}
+    rows.append(Row('paper mode', {name: _edges(r) for name, r in results.items()}))
+    figures = [_figure(results[name], clean[name], name) for name in RUNS[1:]]
+    noisy = {name: simulate(name, rate=RATE, noise=True, seed=0) for name in RUNS}
+    quiet = [simulate(RUNS[0], rate=RATE, noise=True, seed=1 + i) for i in range(CALIBRATION)]
+    settings = Settings.for_mode('monitor', sample_rate=RATE)
+    judged = {name: _edges(run(noisy[name], settings)) for name in RUNS}
+    rows.append(Row('monitor mode', judged))
+    rows.append(Row('SCADA-rate monitor, 1 Hz', _scada()))
+    for row in (_baseline(name, noisy, quiet) for name in DETECTORS):
+        rows += row
+    rows += _states(noisy, quiet)
+    file = directory / 'paper.json'
+    content = {'text': TEXT, 'columns': COLUMNS, 'rows': [row.cells() for row in rows],
+               'figures': '\n'.join(figures)}  # fmt: skip
+    directory.mkdir(parents=True, exist_ok=True)
+    file.write_text(json.dumps(content), encoding='utf-8')
+    return file
+
+
+def _edges(result: Result) -> Alarms:
+    return np.array([event.stamp * 1e-9 for event in result.detections])
+
+
+def _figure(result: Result, columns: Mapping[str, NDArray], name: str) -> str:
+    from damadics_fd.figures.panels import six_panels
+
+    with tempfile.TemporaryDirectory() as folder:
+        file = six_panels(result, columns, Path(folder) / 'figure.png', title=name)
+        data = base64.b64encode(file.read_bytes()).decode('ascii')
+    return f'<img alt="{name}" style="max-width:100%" src="data:image/png;base64,{data}">'
+
+
+def _rising(t: Floats, exceeds: NDArray[np.bool_]) -> Alarms:
+    before = np.concatenate(([False], exceeds[:-1]))
+    return t[exceeds & ~before]
+
+
+def _samples(columns: Mapping[str, NDArray], clean: Mapping[str, NDArray]) -> Floats:
+    samples = scada_samples(columns)
+    samples[:, 1] = clean['cv']
+    return samples
+
+
+def _limited(
+    statistic: Callable[[Any], Floats], noisy: Mapping[str, Any], quiet: list[Any]
+) -> dict[str, Alarms]:
+    """Return the alarms of a statistic whose limit comes from fault-free runs."""
+    limit = MARGIN * max(float(statistic(q).max()) for q in quiet)
+    return {name: _rising(c['stamp'] / 1e9, statistic(c) >= limit) for name, c in noisy.items()}
+
+
+def _baseline(name: str, noisy: Mapping[str, Any], quiet: list[Any]) -> list[Row]:
+    """Return the row of one baseline, none for what does not run at this rate."""
+    detector = DETECTORS[name]()
+    if name in ('scada', 'fixed_r1', 'fixed_r2'):
+        return []
+    detector.t_on, detector.learn_from = LEARN_UNTIL, SETTLED
+    first = scada_samples(quiet[0])
+    try:
+        detector.fit(first[first[:, 0] <= LEARN_UNTIL])
+        alarms = _limited(lambda c: detector.statistic(scada_samples(c)), noisy, quiet)
+    except MissingPackageError as error:
+        return [Row(f'{detector.title}: {error}', {n: np.array([]) for n in RUNS})]
+    return [Row(detector.title, alarms)]
+
+
+def _states(noisy: Mapping[str, Any], quiet: list[Any]) -> list[Row]:
+    ekf = FrictionSpringEkf(1.0 / RATE)
+    learned = slice(int(SETTLED * RATE), int(LEARN_UNTIL * RATE))
+
+    def statistic(columns: Any) -> Floats:
+        values = ekf.statistic(dict(columns), 2.0 * NOISE, learned)
+        return np.where(columns['stamp'] >= LEARN_UNTIL * 1e9, values, 0.0)
+
+    try:
+        return [Row(ekf.title, _limited(statistic, noisy, quiet))]
+    except MissingPackageError as error:
+        return [Row(f'{ekf.title}: {error}', {n: np.array([]) for n in RUNS})]
+
+
+def _scada() -> dict[str, Alarms]:
+    """Learn from a fault-free record with the paper's CV profile, then run the experiments."""
+    from damadics_plant import Scenario, load_scenario, simulate
+    from damadics_plant.sources import Steps
+
+    base: Scenario = load_scenario(RUNS[0])
+    times, values = base.cv.times, base.cv.values
+    cycles = range(REPEATS)
+    cv = Steps(
+        tuple(t + base.duration * i for i in cycles for t in times), tuple(values) * REPEATS
+    )
+    long = replace(base, cv=cv, duration=base.duration * REPEATS - 1.0)
+    settings = ScadaSettings(t_on_s=SETTLED, learn_s=long.duration)
+    detector = Scada(settings)
+
+    def record(scenario: Any, seed: int) -> Floats:
+        columns = simulate(scenario, rate=1.0, noise=True, seed=seed)
+        return _samples(columns, simulate(scenario, rate=1.0, duration=scenario.duration))
+
+    detector.fit(record(long, 9))
+    alarms = {}
+    for name in RUNS:
+        samples = record(load_scenario(name), 0)
+        exceeds = np.maximum.accumulate(detector.statistic(samples) >= 1.0)
+        alarms[name] = _rising(samples[:, 0], exceeds)
+    return alarms

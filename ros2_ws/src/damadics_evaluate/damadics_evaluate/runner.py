@@ -1,0 +1,168 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Run a campaign over local processes or a Dask cluster, with progress bar and resume."""
+
+import json
+import multiprocessing
+import os
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+from damadics_evaluate.baselines import DETECTORS
+from damadics_evaluate.campaign import (
+    CALIBRATION_SEED,
+    NOMINAL_SEED,
+    Campaign,
+    limits,
+    nominal_unit,
+    scenario_unit,
+    versions,
+)
+from damadics_evaluate.trajectories import case
+
+RESULTS = 'results.jsonl'
+MANIFEST = 'campaign.json'
+Result = dict[str, Any]
+Unit = tuple[Callable[..., list[Result]], tuple[Any, ...]]
+
+
+def read_results(directory: Path) -> list[Result]:
+    """
+    Return the results of a campaign directory; a torn last line of a killed run is dropped.
+
+    Where a detector was run again with other settings, its newest results count.
+
+    :param directory: as given to `run_campaign`.
+    :raises FileNotFoundError: where it holds no results.
+    """
+    file = directory / RESULTS
+    if not file.exists():
+        raise FileNotFoundError(f'{directory} holds no {RESULTS}: make it with evaluate run')
+    results = []
+    for line in file.read_text(encoding='utf-8').splitlines():
+        try:
+            results.append(json.loads(line))
+        except json.JSONDecodeError:
+            continue
+    newest = {r['detector']: r['settings_hash'] for r in results}
+    return [r for r in results if r['settings_hash'] == newest[r['detector']]]
+
+
+def run_campaign(
+    campaign: Campaign, directory: Path, jobs: int | None = None, scheduler: str | None = None
+) -> list[Result]:
+    """
+    Run what is missing of a campaign and return all its results.
+
+    :param campaign: what to run.
+    :param directory: where results go; results already there with the same settings are kept.
+    :param jobs: local processes, by default one per core.
+    :param scheduler: address of a Dask scheduler, such as tcp://host:8786, instead of processes.
+    """
+    directory.mkdir(parents=True, exist_ok=True)
+    _write_manifest(campaign, directory)
+    earlier = read_results(directory) if (directory / RESULTS).exists() else []
+    hashes = {name: campaign.settings_hash(name) for name in campaign.detectors}
+    kept = [r for r in earlier if hashes.get(r['detector']) == r['settings_hash']]
+    done = {_key(r) for r in kept}
+    with _executor(jobs, scheduler) as executor:
+        kept += _collect(executor, directory, _nominal_units(campaign, done), 'fault-free days')
+        limit = limits(campaign, [r for r in kept if r['kind'] == 'nominal'])
+        kept += _collect(executor, directory, _scenario_units(campaign, limit, done), 'scenarios')
+    return kept
+
+
+def _write_manifest(campaign: Campaign, directory: Path) -> None:
+    """Write what was run here, all calls together."""
+    file = directory / MANIFEST
+    stated = asdict(campaign)
+    if file.exists():
+        earlier = json.loads(file.read_text(encoding='utf-8'))['campaign']
+        for name in ('scenarios', 'detectors', 'seeds'):
+            stated[name] = list(dict.fromkeys((*earlier[name], *stated[name])))
+        for name in ('nominal_days', 'isolated_seeds'):
+            stated[name] = max(earlier[name], stated[name])
+    manifest = {'campaign': stated, 'versions': versions()}
+    file.write_text(json.dumps(manifest, indent=2), encoding='utf-8')
+
+
+def _key(result: Result) -> tuple[Any, ...]:
+    return result.get('scenario', 'nominal'), result['seed'], result['detector']
+
+
+def _missing(campaign: Campaign, name: str, seed: int, done: set[tuple[Any, ...]]) -> Campaign:
+    """Return the campaign with those detectors that have no result of this unit yet."""
+    left = tuple(d for d in campaign.detectors if (name, seed, d) not in done)
+    return replace(campaign, detectors=left)
+
+
+def _nominal_units(campaign: Campaign, done: set[tuple[Any, ...]]) -> Iterator[Unit]:
+    for seed in range(CALIBRATION_SEED, CALIBRATION_SEED + campaign.calibration_days):
+        part = _missing(campaign, 'nominal', seed, done)
+        part = replace(
+            part, detectors=tuple(d for d in part.detectors if DETECTORS[d].calibrated)
+        )
+        if part.detectors:
+            yield nominal_unit, (part, seed)
+    for seed in range(NOMINAL_SEED, NOMINAL_SEED + campaign.nominal_days):
+        part = _missing(campaign, 'nominal', seed, done)
+        if part.detectors:
+            yield nominal_unit, (part, seed)
+
+
+def _scenario_units(
+    campaign: Campaign, limit: dict[str, float], done: set[tuple[Any, ...]]
+) -> Iterator[Unit]:
+    by_length = sorted(campaign.scenarios, key=lambda name: -case(name).duration)
+    for name in by_length:  # the longest first, so that no core waits at the end
+        for seed in campaign.seeds:
+            part = _missing(campaign, name, seed, done)
+            if part.detectors:
+                yield scenario_unit, (part, limit, name, seed)
+
+
+def _collect(
+    executor: Executor, directory: Path, units: Iterable[Unit], what: str
+) -> list[Result]:
+    """Run the units, writing each result as soon as it is there."""
+    from tqdm import tqdm
+
+    futures = [executor.submit(function, *arguments) for function, arguments in units]
+    results = []
+    with (
+        (directory / RESULTS).open('a', encoding='utf-8') as stream,
+        tqdm(total=len(futures), desc=what, unit='run', disable=not futures) as bar,
+    ):
+        try:
+            for future in as_completed(futures):
+                for result in future.result():
+                    results.append({**result, 'versions': versions()})
+                    stream.write(json.dumps(results[-1]) + '\n')
+                stream.flush()
+                bar.update()
+        except BaseException:
+            for future in futures:
+                future.cancel()
+            raise
+    return results
+
+
+@contextmanager
+def _executor(jobs: int | None, scheduler: str | None) -> Iterator[Executor]:
+    if scheduler is None:
+        for name in ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS'):
+            os.environ.setdefault(name, '1')  # one process per core already
+        context = multiprocessing.get_context('spawn')
+        with ProcessPoolExecutor(jobs or os.cpu_count(), mp_context=context) as pool:
+            yield pool
+        return
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise ImportError('--scheduler needs Dask: pip install "dask[distributed]"') from error
+    with Client(scheduler, timeout='15s') as client:  # type: ignore[no-untyped-call]
+        yield client.get_executor(pure=False)

@@ -1,0 +1,29 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+from setuptools import find_packages, setup
+
+package = 'damadics_evaluate'
+
+setup(
+    name=package,
+    version='0.1.0',
+    packages=find_packages(exclude=['test']),
+    package_data={package: ['*.j2']},
+    data_files=[
+        ('share/ament_index/resource_index/packages', ['resource/' + package]),
+        ('share/' + package, ['package.xml']),
+    ],
+    install_requires=['setuptools'],
+    zip_safe=False,
+    maintainer='DAMADICS FD maintainers',
+    maintainer_email='maintainers@damadics-fd.example',
+    description='Indices of the DAMADICS benchmark, baselines, campaigns and reports.',
+    license='Apache-2.0',
+    extras_require={
+        'test': ['pytest', 'hypothesis'],
+        'report': ['jinja2', 'matplotlib'],
+        'baselines': ['river', 'filterpy', 'scikit-learn'],
+        'cluster': ['dask[distributed]'],
+    },
+    entry_points={'console_scripts': ['evaluate = damadics_evaluate:main']},
+)

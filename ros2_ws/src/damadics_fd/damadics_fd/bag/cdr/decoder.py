@@ -1,0 +1,232 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Decode the messages of one channel to columns."""
+
+import re
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from damadics_fd.bag.cdr import kernels
+from damadics_fd.bag.cdr.definition import Definition, parse_definition
+from damadics_fd.bag.cdr.groups import Alike, first_message
+from damadics_fd.bag.cdr.kernels import LOG_TIME, Words
+from damadics_fd.bag.cdr.layout import Layout, Place, layout_of
+from damadics_fd.bag.errors import BagError
+from damadics_fd.bag.mcap.reader import Batch, McapFile
+
+Columns = dict[str, NDArray[Any]]
+MOST_LAYOUTS = 64  # in one chunk, that are looked for by column
+_ELEMENT = re.compile(r'\.\d+(\.|$)')  # a member of a sequence of messages: no column
+
+
+class Decoder:
+    """
+    Decode the messages of one channel to columns.
+
+    :param mcap: file of the channel.
+    :param number: number of the channel.
+    :param fields: fields to read, None for all that are numbers.
+    :raises BagError: where the messages are not CDR of a known definition.
+    """
+
+    def __init__(self, mcap: McapFile, number: int, fields: Sequence[str] | None):
+        channel = mcap.channels[number]
+        schema = mcap.schemas.get(channel.schema_id)
+        self._mcap, self._number = mcap, number
+        self.path, self.topic, self.fields = mcap.path, channel.topic, fields
+        if channel.message_encoding != 'cdr':
+            raise BagError(f'{channel.topic} is encoded as {channel.message_encoding!r}, not as'
+                           ' cdr', mcap.path)
+        if schema is None or schema.encoding != 'ros2msg':
+            raise BagError(f'{channel.topic} has no ros2msg definition', mcap.path)
+        self.kind = schema.name
+        try:
+            text = schema.data.decode()
+            self.definition: Definition = parse_definition(schema.name, text)
+        except (BagError, UnicodeDecodeError) as error:
+            raise BagError(f'{channel.topic}: {error}', mcap.path) from error
+        self._layouts: list[Layout] = []
+        self._alike: Alike | None = None
+
+    def empty(self) -> Columns:
+        """Return columns of no messages."""
+        names = self.fields or [m.name for m in self.definition[self.kind] if m.name != 'header']
+        return {name: np.empty(0) for name in names} | {
+            name: np.empty(0, np.int64) for name in ('stamp', 'log_time')
+        }
+
+    def decode(self, batch: Batch, starts: NDArray, sizes: NDArray) -> Columns:
+        """
+        Decode messages of this channel.
+
+        :param batch: chunk that holds them.
+        :param starts: places of the messages in it.
+        :param sizes: their sizes.
+        :return: the columns.
+        :raises BagError: where a message does not follow its definition or lacks a field.
+        """
+        left = np.ones(len(starts), bool)
+        groups: list[tuple[NDArray, Columns]] = []
+        while left.any():
+            first = int(left.argmax())
+            layout = self._layout(batch.data[starts[first]:starts[first] + sizes[first]])
+            if len(groups) < MOST_LAYOUTS:
+                rows = left & (sizes == sizes[first])
+                rows[rows] = same_layout(batch.words, starts[rows], layout)
+            else:
+                rows = np.zeros(len(left), bool)
+            rows[first] = True
+            groups.append((rows, self._columns(batch.words, starts[rows], layout)))
+            left &= ~rows
+        columns = groups[0][1] if len(groups) == 1 else _merge(groups)
+        columns['log_time'] = batch.words.w8[starts + LOG_TIME].view(np.int64)
+        return columns
+
+    def decode_alike(self, data: NDArray[np.uint8]) -> Columns | None:
+        """
+        Decode a chunk of which all messages of this channel are alike, in one pass.
+
+        :param data: records of the chunk.
+        :return: the columns, None where it takes the general way.
+        """
+        alike = self._alike_in(data)
+        if not alike:
+            return None
+        block = alike.block(len(data) // (alike.size + kernels.BODY_AT))
+        count = alike.decode(kernels.words(data), len(data), self._number, block)
+        if count < 0:
+            self._alike = None
+            return None
+        whole = 2 * count > block.shape[1]
+        return alike.columns(block[:, :count] if whole else block[:, :count].copy())
+
+    def decode_all(self, total: int) -> Columns | None:
+        """
+        Decode the whole file where all messages are alike.
+
+        :param total: number of messages.
+        :return: the columns, None where it takes the general way.
+        :raises BagError: where the file is damaged.
+        """
+        block: NDArray[np.uint64] | None = None
+        done = 0
+        for _, data in self._mcap.chunks():
+            alike = self._alike_in(data)
+            if not alike:
+                return None
+            if block is None:
+                block = alike.block(total)
+            count = alike.decode(kernels.words(data), len(data), self._number, block, done)
+            if count < 0:
+                return None
+            done += count
+        if block is None or not self._alike or done != total:
+            return None
+        return self._alike.columns(block)
+
+    def _alike_in(self, data: NDArray[np.uint8]) -> Alike | None:
+        """Return how to decode messages that are like the first one of a chunk."""
+        if not self._alike and (found := first_message(data, self._number)):
+            start, size = found
+            layout = self._layout(data[start:start + size])
+            self._alike = Alike.of(layout, size, self._places(layout))
+        return self._alike
+
+    def _layout(self, message: NDArray[np.uint8]) -> Layout:
+        for layout in self._layouts:
+            if layout.size <= len(message) <= layout.size + 3 and layout.matches(message[None]):
+                return layout
+        try:
+            layout = layout_of(self.definition, self.kind, message.tobytes())
+        except BagError as error:
+            raise BagError(f'{self.topic}: {error.reason}', self.path) from error
+        self._layouts = [*self._layouts[-MOST_LAYOUTS:], layout]
+        return layout
+
+    def _columns(self, words: Words, starts: NDArray, layout: Layout) -> Columns:
+        return {
+            name: _time(words, starts + place, layout.order) if isinstance(place, int)
+            else _field(words, starts, place, layout.order)
+            for name, place in self._places(layout).items()
+        }
+
+    def _places(self, layout: Layout) -> dict[str, Place | int]:
+        """Choose what to read: places by column name, the bare offset for times."""
+        found: dict[str, Place | int] = {}
+        by_name = {place.name: place for place in layout.places}
+        for place in layout.places:
+            if _ELEMENT.search(place.name):
+                continue
+            base, _, last = place.name.rpartition('.')
+            if last == 'sec' and by_name.get(f'{base}.nanosec', place).dtype == 'u4':
+                found['stamp' if base == 'header.stamp' else base] = place.offset
+            elif not (last == 'nanosec' and f'{base}.sec' in by_name):
+                found['frame_id' if place.name == 'header.frame_id' else place.name] = place
+        if self.fields is None:
+            return {
+                name: place for name, place in found.items()
+                if isinstance(place, int) or not place.text
+            }
+        missing = [name for name in self.fields if name not in (*found, 'log_time')]
+        if missing:
+            raise BagError(
+                f'{self.topic} ({self.kind}) has no field {", ".join(missing)}; it has '
+                + ', '.join(found), self.path,
+            )
+        chosen = [*self.fields, *(['stamp'] if 'stamp' in found else [])]
+        return {name: found[name] for name in chosen if name != 'log_time'}
+
+
+def same_layout(words: Words, starts: NDArray, layout: Layout) -> NDArray[np.bool_]:
+    """Tell which messages have their fields at the places of a layout."""
+    same = words.w2[starts] == (0x0100 if layout.order == '<' else 0)
+    for offset, value in layout.lengths:
+        same &= _ordered(words.w4[starts + offset], layout.order) == value
+    return same
+
+
+def _ordered(values: NDArray, order: str) -> NDArray:
+    return values if order == '<' else values.byteswap()
+
+
+def _time(words: Words, at: NDArray, order: str) -> NDArray[np.int64]:
+    seconds = _ordered(words.w4[at], order).view(np.int32)
+    return seconds * np.int64(10**9) + _ordered(words.w4[at + 4], order)
+
+
+def _field(words: Words, starts: NDArray, place: Place, order: str) -> NDArray:
+    """Gather any field: numbers, arrays, strings."""
+    if place.text:
+        width = place.repeat or 0
+        rows = words.w1[starts[:, None] + (place.offset + np.arange(width))]
+        return np.char.decode(rows.view(f'S{width}')[:, 0] if width else np.zeros(len(rows), 'S1'),
+                              'utf-8', 'replace')
+    size = int(place.dtype[1])
+    source: NDArray[Any] = words[(1, 2, 4, 8).index(size)]
+    if place.repeat is None:
+        return _ordered(source[starts + place.offset], order).view(place.dtype)
+    at = starts[:, None] + (place.offset + size * np.arange(place.repeat))
+    return _ordered(source[at], order).view(place.dtype)
+
+
+def _merge(groups: list[tuple[NDArray, Columns]]) -> Columns:
+    """Put the messages of several layouts back in order."""
+    order = np.argsort(np.concatenate([np.flatnonzero(rows) for rows, _ in groups]))
+    names = [name for name in groups[0][1] if all(name in part for _, part in groups)]
+    return {name: join([part[name] for _, part in groups])[order] for name in names}
+
+
+def join(arrays: list[NDArray]) -> NDArray:
+    """Put the pieces of a column together; rows of changing length become objects."""
+    if len({array.shape[1:] for array in arrays}) > 1:
+        arrays = [_rows(array) for array in arrays]
+    return np.concatenate(arrays)
+
+
+def _rows(array: NDArray) -> NDArray:
+    rows = np.empty(len(array), object)
+    rows[:] = list(array)
+    return rows

@@ -1,0 +1,289 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Run a recording through estimator and detector, piece by piece, without ROS."""
+
+import math
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from damadics_fd.bag.cdr.decoder import Columns
+from damadics_fd.bag.errors import BagError
+from damadics_fd.bag.recording import Recording, origin
+from damadics_fd.causes import load_causes
+from damadics_fd.commands.replay.flags import FlagWriter
+from damadics_fd.core.decision.alarm import RAISED
+from damadics_fd.core.decision.detector import Detector
+from damadics_fd.core.decision.events import Event
+from damadics_fd.core.pipeline import Result, run, watch
+from damadics_fd.core.quality import EXPLANATIONS, REASONS, REMEDIES
+from damadics_fd.core.scada.estimator import estimator_for
+from damadics_fd.core.settings import Settings
+from damadics_fd.core.signature.signature import Signature
+from damadics_fd.core.signature.state import STATE_VERIFY
+from damadics_fd.figures.decimation import Thinner
+from damadics_fd.figures.valve_signature import ForceMap, force_over_position
+
+NANO = 1e9
+NAMING_S = (30.0, 300.0, np.inf)  # after an alarm; a later fault must not change the name
+STRIDE = 120  # rows between two attempts of mode scada to name a fault
+JUDGEMENT = ('cause', 'confidence', 'strength', 'spread')
+NEEDED = {'paper': ('cv', 'x1'), 'scada': ('cv', 'x1', 'p1', 'p2'),
+          'monitor': ('cv', 'x1', 'p1', 'p2', 'ps')}
+PIECE = 8192  # rows judged at once: they fit the cache, and calls cost nothing against them
+
+
+@dataclass
+class Outcome:
+    """
+    What became of one recording.
+
+    :param bag: its name.
+    :param mode: mode of estimator and detector.
+    :param samples: measurements read.
+    :param duration_s: from the first to the last stamp [s].
+    :param samples_per_s: over reading, decoding, estimator and detector.
+    :param detections: `t` [s] since scenario zero (since the first sample for real data), `stamp`
+        [ns] and the evidence of each.
+    :param refused: samples that never reached the filters, by reason.
+    :param status: what the estimator did at the end: monitoring, still learning, ...
+    :param problems: damaged places in the file, which were left out.
+    :param error: why it could not be replayed, '' where it was.
+    """
+
+    bag: str
+    mode: str
+    samples: int = 0
+    duration_s: float = 0.0
+    samples_per_s: float = 0.0
+    detections: list[dict[str, Any]] = field(default_factory=list)
+    refused: dict[str, int] = field(default_factory=dict)
+    status: str = ''
+    problems: list[str] = field(default_factory=list)
+    error: str = ''
+
+
+class Chain:
+    """
+    Estimator and detector of a mode, as the nodes run them.
+
+    :param settings: all settings.
+    """
+
+    def __init__(self, settings: Settings):
+        self._settings = settings
+        self._estimator = estimator_for(settings)
+        self._detector = Detector(settings, load_causes().classes)
+
+    def take(self, columns: Columns) -> Result:
+        """Judge the next columns and keep everything."""
+        return run(columns, self._settings, self._estimator, self._detector)
+
+    def watch(self, columns: Columns) -> list[Event]:
+        """Judge the next columns and keep the events only."""
+        return watch(columns, self._settings, self._estimator, self._detector)
+
+    @property
+    def signature(self) -> Signature:
+        """The valve signature."""
+        return self._detector.signature
+
+    @property
+    def status(self) -> str:
+        """What the estimator does, in a few words."""
+        return self._estimator.status
+
+    @property
+    def refused(self) -> dict[str, int]:
+        """Samples that the estimator refused, by reason."""
+        counters = self._estimator.counters
+        return {name: counters[name] for name in REASONS[1:] if counters[name]}
+
+
+def evidence(event: Event, zero: int) -> dict[str, Any]:
+    """Return a detection with its evidence, fit for JSON."""
+    values = {
+        't': (event.stamp - zero) / NANO,
+        'stamp': event.stamp,
+        'residual': event.residual,
+        'threshold': event.threshold,
+        'ratio': event.ratio,
+        'level': event.level,
+        'occurrence': event.occurrence,
+        'onset': (event.onset - zero) / NANO if event.onset else None,
+        'cause': event.cause,
+        'confidence': event.confidence,
+        'strength': event.strength,
+        'spread': event.spread,
+        'text': event.text,
+    }
+    return {
+        name: None if isinstance(value, float) and not math.isfinite(value) else value
+        for name, value in values.items()
+    }
+
+
+def collect(detections: list[dict[str, Any]], events: Iterable[Event], zero: int) -> None:
+    """Add new detections; a cause that becomes known later is put into its detection."""
+    for event in events:
+        if event.transition == RAISED:
+            detections.append(evidence(event, zero))
+        elif event.cause and detections and detections[-1]['occurrence'] == event.occurrence:
+            present = evidence(event, zero)
+            detections[-1] |= {name: present[name] for name in JUDGEMENT}
+
+
+@dataclass(frozen=True)
+class Plan:
+    """
+    How to replay.
+
+    :param mode: paper, monitor or scada.
+    :param settings: settings that differ from the defaults of the mode.
+    :param figures: folder for pictures, None for none.
+    :param bags: folder for bags with the flags, None for none.
+    """
+
+    mode: str = 'monitor'
+    settings: dict[str, Any] = field(default_factory=dict)
+    figures: Path | None = None
+    bags: Path | None = None
+
+    def chain(self) -> Chain:
+        """Return estimator and detector in their first state."""
+        return Chain(Settings.for_mode(self.mode, **self.settings))
+
+
+def replay(
+    recording: Recording, plan: Plan, progress: Callable[[int], None] = lambda count: None,
+    stem: str = '',
+) -> Outcome:
+    """
+    Replay one recording.
+
+    :param recording: what to replay.
+    :param plan: how.
+    :param progress: told the number of samples of each piece.
+    :param stem: file name without suffix for pictures and bags.
+    :return: what became of it; where it cannot be read, `error` says why.
+    """
+    outcome = Outcome(recording.name, plan.mode)
+    try:
+        _replay(recording, plan, outcome, progress, stem or Path(recording.path).stem)
+    except (BagError, OSError, RuntimeError) as error:
+        outcome.error = str(error)
+    return outcome
+
+
+def _replay(
+    recording: Recording, plan: Plan, outcome: Outcome, progress: Callable[[int], None], stem: str
+) -> None:
+    chain = plan.chain()
+    zero = first = last = None
+    flags = FlagWriter(plan.bags / f'{stem}_flags.mcap', recording) if plan.bags else None
+    thinner = Thinner() if plan.figures else None
+    forces = ForceMap(chain.signature) if plan.figures and plan.mode == 'monitor' else None
+    lacking = set(NEEDED[plan.mode])
+    spent = 0.0
+    pieces = joined(recording.chunks(outcome.problems.append))
+    try:
+        while True:
+            began = time.perf_counter()
+            columns = next(pieces, None)
+            if columns is None:
+                break
+            stamp = columns['stamp']
+            lacking &= {name for name in lacking if np.isnan(columns.get(name, np.nan)).all()}
+            if (stamp < 0).any():
+                raise BagError('has stamps that have rolled over: see verify', recording.name)
+            if zero is None or first is None:
+                zero, first = origin(int(stamp[0])), int(stamp[0])
+            last = int(stamp[-1])
+            result = chain.take(columns) if flags or thinner else None
+            events = result.events if result else chain.watch(columns)
+            spent += time.perf_counter() - began
+            collect(outcome.detections, events, zero)
+            outcome.samples += len(stamp)
+            if result and flags:
+                flags.write(result)
+            if result and thinner:
+                thinner.add(columns, result)
+            if result and forces:
+                forces.add(result.estimates[result.accepted])
+            progress(len(stamp))
+    finally:
+        if flags:
+            flags.close()
+    if first is None or last is None:
+        raise BagError('has no measurement: the topic is empty', recording.name)
+    outcome.duration_s = (last - first) / NANO
+    outcome.samples_per_s = outcome.samples / spent
+    outcome.refused, outcome.status = chain.refused, chain.status
+    _judge_refused(outcome, lacking)
+    if thinner and plan.figures:
+        _draw(thinner, recording, outcome, plan.figures / f'{stem}.png')
+    if forces and plan.figures and chain.signature.view().state >= STATE_VERIFY:
+        force_over_position(forces, chain.signature, plan.figures / f'{stem}_signature.png',
+                            Path(recording.name).name.removesuffix('.mcap'))
+
+
+def _judge_refused(outcome: Outcome, lacking: set[str]) -> None:
+    """Say why most samples were refused; where all were, there is no result."""
+    refused = sum(outcome.refused.values())
+    if 2 * refused < outcome.samples:
+        return
+    reason = max(outcome.refused, key=lambda name: outcome.refused[name])
+    why = f'{EXPLANATIONS[reason]}; {REMEDIES[reason]}'
+    if lacking:
+        why = (f'{", ".join(sorted(lacking))} not measured, but mode {outcome.mode} needs'
+               f' {", ".join(NEEDED[outcome.mode])}: name the signals with --map, or take'
+               ' another --mode')
+    text = f'{refused} of {outcome.samples} samples were refused ({reason}): {why}'
+    if refused == outcome.samples:
+        raise BagError(text, outcome.bag)
+    outcome.problems.append(f'{outcome.bag}: {text}')
+
+
+def joined(pieces: Iterable[Columns]) -> Iterator[Columns]:
+    """Join short pieces to `PIECE` rows or more; without header, the log time is the stamp."""
+    waiting: list[Columns] = []
+    for piece in pieces:
+        if 'stamp' not in piece:
+            piece = {**piece, 'stamp': piece['log_time']}
+        waiting.append(piece)
+        if sum(len(part['stamp']) for part in waiting) >= PIECE:
+            yield _join(waiting)
+            waiting = []
+    if any(len(part['stamp']) for part in waiting):
+        yield _join(waiting)
+
+
+def _join(pieces: list[Columns]) -> Columns:
+    if len(pieces) == 1:
+        return pieces[0]
+    names = [name for name in pieces[0] if all(name in piece for piece in pieces)]
+    return {name: np.concatenate([piece[name] for piece in pieces]) for name in names}
+
+
+def _draw(thinner: Thinner, recording: Recording, outcome: Outcome, path: Path) -> None:
+    from damadics_fd.figures.panels import six_panels
+
+    result, columns = thinner.thinned()
+    truth = recording.truth(outcome.problems.append)
+    if truth is not None and len(truth['stamp']):
+        index = np.searchsorted(truth['stamp'], columns['stamp'], side='right') - 1
+        for name in ('fault', 'strength'):
+            columns[name] = truth[name][np.clip(index, 0, None)]
+    six_panels(result, columns, path, f'{Path(recording.name).name}, mode {outcome.mode}')
+
+
+def warm_up(plans: Sequence[Plan]) -> None:
+    """Load or compile the loops, so that the first recording is not slower than the next."""
+    names = ('cv', 'x1', 'p1', 'p2', 't1', 'flow', 'ps')
+    columns: Columns = {name: np.array([0.5]) for name in names}
+    for plan in plans:
+        plan.chain().watch({'stamp': np.array([1]), **columns})

@@ -1,0 +1,211 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Publish a recording on the topics of the live system, with /clock and at any speed."""
+
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+import rclpy
+from builtin_interfaces.msg import Time
+from damadics_msgs.msg import Estimate as EstimateMessage
+from damadics_msgs.msg import FaultEvent, FaultFlag, FaultState, Float64Stamped, Measurement
+from rclpy.duration import Duration
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from rosgraph_msgs.msg import Clock
+from tqdm import tqdm
+
+from damadics_fd.bag.cdr.decoder import Columns
+from damadics_fd.bag.recording import SIGNALS, Recording
+from damadics_fd.causes import load_causes
+from damadics_fd.commands.replay.bags import Plan, joined
+from damadics_fd.core.decision.detector import Detector
+from damadics_fd.core.scada.estimator import estimator_for
+from damadics_fd.core.settings import Settings
+from damadics_fd.ros import qos
+from damadics_fd.ros.conversions import event_message, set_stamp, write_estimate, write_flag
+
+CLOCK_PERIOD = 0.01  # [s] of wall time between two messages on /clock
+HEARTBEAT = 10**9  # [ns] of scenario time between two flags without change
+DISCOVERY = 3.5  # [s] without a new subscriber before the first sample; DDS announces every 3 s
+
+
+class Player(Node):
+    """
+    Publish the samples of a recording and what estimator and detector make of them.
+
+    :param settings: of estimator and detector; None publishes the samples alone.
+    :param rate: speed in multiples of real time.
+    """
+
+    def __init__(self, settings: Settings | None, rate: float):
+        super().__init__('replay')
+        self._rate = rate
+        self._clock = self.create_publisher(Clock, '/clock', 10)
+        self._measurement = self.create_publisher(Measurement, 'measurement', qos.SAMPLES)
+        self._state = self.create_publisher(FaultState, 'fault_state', qos.SAMPLES)
+        self._judges = None
+        if settings:
+            self._judges = estimator_for(settings), Detector(
+                settings, load_causes().classes)
+            self._estimate = self.create_publisher(EstimateMessage, 'estimate', qos.SAMPLES)
+            self._residual = self.create_publisher(Float64Stamped, 'residual', qos.SAMPLES)
+            self._threshold = self.create_publisher(Float64Stamped, 'threshold', qos.SAMPLES)
+            self._flag = self.create_publisher(FaultFlag, 'fault_flag', qos.FLAG)
+            self._event = self.create_publisher(FaultEvent, 'fault_event', qos.EVENTS)
+        self._begin: tuple[int, float] | None = None  # stamp [ns] and wall time [s] of the start
+        self._last_clock = 0.0
+        self._shown: tuple[Any, ...] = ()
+
+    def wait_for_subscribers(self, needed: bool) -> None:
+        """Wait until all subscribers are matched; where they are needed, until there is one."""
+        quiet_since = time.monotonic()
+        last_known = -1
+        told = False
+        while rclpy.ok():
+            time.sleep(0.05)
+            matched = self._measurement.get_subscription_count()
+            known = self.count_subscribers(self._measurement.topic_name)
+            now = time.monotonic()
+            if known != last_known or matched < known:
+                last_known, quiet_since = known, now
+            if now - quiet_since >= DISCOVERY:
+                if matched or not needed:
+                    return
+                if not told:
+                    self.get_logger().info(
+                        'waiting for a node that subscribes to measurement: ros2 run damadics_fd'
+                        ' estimator'
+                    )
+                    told = True
+
+    def play(self, columns: Columns) -> Iterator[int]:
+        """
+        Publish columns at the pace of their stamps.
+
+        :param columns: as a recording yields them.
+        :return: the row of each sample, once it is published.
+        """
+        rows = zip(
+            columns['stamp'].tolist(),
+            *(np.broadcast_to(columns.get(name, np.nan), columns['stamp'].shape).tolist()
+              for name in SIGNALS),
+            strict=True,
+        )
+        for row, (stamp, *signals) in enumerate(rows):
+            self._wait_for(stamp)
+            message = Measurement(**dict(zip(SIGNALS, signals, strict=True)))
+            set_stamp(message.header.stamp, stamp)
+            self._measurement.publish(message)
+            if 'fault' in columns:
+                state = FaultState(fault=int(columns['fault'][row]),
+                                   strength=float(columns['strength'][row]))
+                state.header.stamp = message.header.stamp
+                self._state.publish(state)
+            self._judge(stamp, signals)
+            yield row
+
+    def finish(self) -> None:
+        """Let subscribers take the last sample, then go."""
+        self._measurement.wait_for_all_acked(Duration(seconds=2.0))
+        self.destroy_node()
+
+    def _wait_for(self, stamp: int) -> None:
+        """Wait until a sample is due, showing the time on /clock."""
+        now = time.perf_counter()
+        if self._begin is None:
+            self._begin = stamp, now
+        due = self._begin[1] + (stamp - self._begin[0]) * 1e-9 / self._rate
+        while now < due:
+            time.sleep(min(due - now, CLOCK_PERIOD))
+            now = time.perf_counter()
+            if due - now > CLOCK_PERIOD:
+                self._tell(stamp - int((due - now) * self._rate * 1e9), now)
+        if now - self._last_clock >= CLOCK_PERIOD:
+            self._tell(stamp, now)
+
+    def _tell(self, stamp: int, now: float) -> None:
+        clock = Clock(clock=Time())
+        set_stamp(clock.clock, stamp)
+        self._clock.publish(clock)
+        self._last_clock = now
+
+    def _judge(self, stamp: int, signals: Sequence[float]) -> None:
+        if not self._judges:
+            return
+        estimator, detector = self._judges
+        estimate = estimator.update(stamp, *signals)
+        if estimate is None:
+            return
+        decision = detector.update(estimate)
+        message = EstimateMessage()
+        write_estimate(estimate, message)
+        self._estimate.publish(message)
+        values = decision.residual, decision.threshold
+        for publisher, value in zip((self._residual, self._threshold), values, strict=True):
+            publisher.publish(Float64Stamped(header=message.header, data=value))
+        shown = decision.fault, decision.state, decision.level, stamp // HEARTBEAT
+        if shown != self._shown:
+            self._shown = shown
+            flag = FaultFlag()
+            write_flag(decision, flag)
+            self._flag.publish(flag)
+        for event in decision.events:
+            self._event.publish(event_message(event, ''))
+
+
+def publish(
+    recordings: Sequence[Recording], plan: Plan, rate: float, inputs_only: bool = False,
+    ros_args: Sequence[str] = (),
+) -> int:
+    """
+    Publish recordings one after the other.
+
+    :param recordings: what to publish.
+    :param plan: mode and settings of estimator and detector.
+    :param rate: speed in multiples of real time.
+    :param inputs_only: publish the samples alone, for estimator and detector nodes that run.
+    :param ros_args: arguments of ROS 2, from `--ros-args` on.
+    :return: exit code, 0 also after SIGINT and SIGTERM.
+    :raises BagError: where a recording cannot be read.
+    """
+    rclpy.init(args=list(ros_args))
+    try:
+        for recording in recordings:
+            settings = Settings.for_mode(plan.mode, **plan.settings)
+            player = Player(None if inputs_only else settings, rate)
+            player.wait_for_subscribers(inputs_only)
+            with tqdm(unit=' samples', unit_scale=True, desc=recording.name, disable=None) as bar:
+                truth = recording.truth(lambda text: None)
+                columns = None
+                for columns in joined(recording.chunks(_warn)):
+                    for _ in player.play(_with_truth(columns, truth)):
+                        bar.update()
+                        if not rclpy.ok():
+                            return 0
+            player.finish()
+            if columns is None:
+                _warn(f'{recording.name}: has no measurement: the topic is empty')
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        rclpy.try_shutdown()
+    return 0
+
+
+def _warn(text: str) -> None:
+    print(f'replay: warning: {text}', file=sys.stderr)
+
+
+def _with_truth(columns: Columns, truth: Columns | None) -> Columns:
+    """Add the fault of a simulated recording, where it is known for each sample."""
+    if 'fault' in columns or truth is None or not len(truth['stamp']):
+        return columns
+    rows = np.searchsorted(truth['stamp'], columns['stamp'])
+    rows = np.clip(rows, 0, len(truth['stamp']) - 1)
+    if not np.array_equal(truth['stamp'][rows], columns['stamp']):
+        return columns
+    return columns | {name: truth[name][rows] for name in ('fault', 'strength')}

@@ -1,0 +1,114 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Results of a replay as a table for people, JSON, CSV and Parquet."""
+
+import csv
+import json
+import os
+from collections.abc import Sequence
+from dataclasses import asdict
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from damadics_fd.commands.replay.bags import Outcome
+
+FORMATS = ('.json', '.csv', '.parquet')
+SHOWN = 8  # detections in the table
+_OF_BAG = ('bag', 'mode', 'samples', 'duration_s', 'samples_per_s')
+
+
+def print_table(outcomes: Sequence[Outcome]) -> None:
+    """Print one line per recording."""
+    rows = [('bag', 'mode', 'samples', 'duration', 'samples/s', 'detections [s]')]
+    for outcome in outcomes:
+        times = [f'{detection["t"]:.4f}' for detection in outcome.detections[:SHOWN]]
+        more = len(outcome.detections) - len(times)
+        text = ', '.join(times) + (f', and {more} more' if more else '')
+        if not text:
+            text = 'none' if outcome.status == 'monitoring' else f'none: {outcome.status}'
+        refused = sum(outcome.refused.values())
+        if outcome.error:
+            rows.append((outcome.bag, outcome.mode, '', '', '', 'failed'))
+            continue
+        rows.append((
+            outcome.bag, outcome.mode, f'{outcome.samples:,}', f'{outcome.duration_s:.1f} s',
+            f'{outcome.samples_per_s / 1e6:.2f} M',
+            text + (f'  ({refused} samples refused)' if refused else ''),
+        ))
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        cells = [
+            cell.rjust(width) if 2 <= i <= 4 else cell.ljust(width)
+            for i, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ]
+        print('  '.join(cells).rstrip())
+
+
+def check_format(path: Path) -> None:
+    """
+    Refuse a file that could not be written, before the work is done.
+
+    :param path: file for the results.
+    :raises RuntimeError: where its suffix is none of `FORMATS`, or pyarrow is missing for Parquet.
+    """
+    if path.suffix not in FORMATS:
+        raise RuntimeError(f'--out {path}: the suffix must be one of {", ".join(FORMATS)}')
+    if path.suffix == '.parquet' and find_spec('pyarrow') is None:
+        raise RuntimeError(f'--out {path}: Parquet needs pyarrow: pip install pyarrow')
+
+
+def make_folder(folder: Path) -> None:
+    """
+    Create a folder for results, before the work is done.
+
+    :param folder: the folder.
+    :raises RuntimeError: where nothing can be written to it.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RuntimeError(f'{folder} cannot be created: {error.strerror}') from error
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise RuntimeError(f'{folder} cannot be written to; choose another folder')
+
+
+def write_outcomes(outcomes: Sequence[Outcome], path: Path) -> None:
+    """
+    Write results to a file.
+
+    JSON is a list with one object per recording. CSV and Parquet have one row per detection, and
+    one with an empty `t` for a recording without.
+
+    :param outcomes: what became of each recording.
+    :param path: file; its suffix chooses the format.
+    :raises RuntimeError: as `check_format`.
+    """
+    check_format(path)
+    make_folder(path.parent)
+    if path.suffix == '.json':
+        text = json.dumps([asdict(outcome) for outcome in outcomes], indent=1, allow_nan=False)
+        path.write_text(text + '\n', encoding='utf-8')
+        return
+    rows = _rows(outcomes)
+    names = list(dict.fromkeys(name for row in rows for name in row))
+    if path.suffix == '.csv':
+        with path.open('w', encoding='utf-8', newline='') as file:
+            writer = csv.DictWriter(file, names, restval='')
+            writer.writeheader()
+            writer.writerows(rows)
+        return
+    import pyarrow
+    from pyarrow import parquet
+
+    columns = {name: [row.get(name) for row in rows] for name in names}
+    parquet.write_table(pyarrow.table(columns), path)
+
+
+def _rows(outcomes: Sequence[Outcome]) -> list[dict[str, Any]]:
+    rows = []
+    for outcome in outcomes:
+        values = asdict(outcome)
+        bag = {name: values[name] for name in _OF_BAG}
+        rows += [bag | detection for detection in outcome.detections or [{'t': None}]]
+    return rows

@@ -1,0 +1,258 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""The command replay: recordings through estimator and detector."""
+
+import argparse
+import multiprocessing
+import os
+import re
+import sys
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, wait
+from itertools import chain, count
+from pathlib import Path
+from typing import Any
+
+import yaml
+from tqdm import tqdm
+
+from damadics_fd.bag.errors import BagError, NoMeasurementError
+from damadics_fd.bag.mcap import loading
+from damadics_fd.bag.recording import Recording, find_recordings, parse_maps
+from damadics_fd.commands.replay.bags import Outcome, Plan, replay, warm_up
+from damadics_fd.commands.replay.output import (
+    check_format,
+    make_folder,
+    print_table,
+    write_outcomes,
+)
+from damadics_fd.core.modes import MODES
+from damadics_fd.core.settings import Settings, SettingsError
+from damadics_fd.ros.arguments import split_ros_args
+
+EXAMPLES = """examples:
+  ros2 run damadics_fd replay bags/dablib_friction.mcap --mode paper --figures figures
+  ros2 run damadics_fd replay plant_bags/ --out alarms.csv
+  ros2 run damadics_fd replay 17112001.txt --actuator 1 --mode scada
+  ros2 run damadics_fd replay valve.mcap --map cv=/pos/setpoint.data*0.01 --map x1=/pos/stem.data
+  ros2 run damadics_fd replay bags/dablib_spring.mcap --live --rate 2
+
+exit code: 0 every recording gave a result, 1 one of them failed, 2 wrong command line"""
+BESIDE = Path()  # bags with the flags go next to the inputs
+WARNINGS = 3  # shown per recording
+_SUFFIX = re.compile(r'(\.mcap(\.zstd)?|\.csv|\.txt|\.tsv)$', re.IGNORECASE)
+_counter: Any = None  # samples done by all workers
+
+
+def arguments(args: list[str] | None = None) -> argparse.Namespace:
+    """Parse and check the command line."""
+    parser = argparse.ArgumentParser(
+        prog='replay', epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter,
+        description='Replay recorded bags or tables through estimator and detector.',
+    )
+    parser.add_argument('bags', nargs='+', metavar='BAG', type=Path,
+                        help='MCAP file, bag directory, table (.csv, .txt), or folder of such')
+    parser.add_argument('--mode', choices=MODES, default='monitor',
+                        help='monitor: learn the valve, then watch it; needs ps (default). paper:'
+                        ' the method as printed. scada: slow signals of a control room')
+    parser.add_argument('--settings', type=Path, metavar='FILE',
+                        help='parameter file of the nodes (YAML)')
+    parser.add_argument('--set', action='append', default=[], metavar='NAME=VALUE',
+                        help='one setting; may be repeated')
+    parser.add_argument('--topic', help='topic of the measurements; by default all of them')
+    parser.add_argument('--map', action='append', default=[], metavar='SIGNAL=SOURCE[*FACTOR]',
+                        help='where a signal is: /topic.field in a bag, a column in a table')
+    parser.add_argument('--actuator', type=int, choices=(1, 2, 3),
+                        help='actuator of a table with the tags of the plant')
+    parser.add_argument('--out', type=Path, metavar='FILE',
+                        help='write the result: .json, .csv or .parquet')
+    parser.add_argument('--figures', type=Path, metavar='DIR', help='draw the six panels')
+    parser.add_argument('--bag', type=Path, nargs='?', const=BESIDE, metavar='DIR',
+                        help='write the flags as MCAP, next to the input if no DIR is given')
+    parser.add_argument('--jobs', type=int, default=len(os.sched_getaffinity(0)),
+                        help='processes (default: one per core)')
+    parser.add_argument('--live', action='store_true',
+                        help='publish on the topics, with /clock, instead')
+    parser.add_argument('--rate', type=float,
+                        help='speed of --live in multiples of real time (default 1)')
+    parser.add_argument('--inputs-only', action='store_true',
+                        help='with --live: publish no results, for nodes that run')
+    options = parser.parse_args(args)
+    if options.live and (options.out or options.figures or options.bag):
+        parser.error('--live writes no files: leave out --out, --figures and --bag')
+    if not options.live and (options.rate is not None or options.inputs_only):
+        parser.error('--rate and --inputs-only go with --live')
+    if options.rate is not None and not options.rate > 0.0:
+        parser.error('--rate must be positive')
+    return options
+
+
+def settings_of(options: argparse.Namespace) -> dict[str, Any]:
+    """
+    Return the settings that the user gave.
+
+    :raises SettingsError: where they are wrong, all problems at once.
+    """
+    values: dict[str, Any] = {}
+    if options.settings:
+        values |= _parameters(options.settings)
+    for text in options.set:
+        name, equals, value = text.partition('=')
+        if not equals:
+            raise SettingsError([f'--set {text}: write NAME=VALUE'])
+        try:
+            values[name] = yaml.safe_load(value)
+        except yaml.YAMLError as error:
+            raise SettingsError([f'--set {text}: the value cannot be read']) from error
+    values.pop('mode', None)
+    Settings.for_mode(options.mode, **values)
+    return values
+
+
+def _parameters(path: Path) -> dict[str, Any]:
+    """Read the settings out of a parameter file of the nodes."""
+    try:
+        content = yaml.safe_load(path.read_text(encoding='utf-8'))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise SettingsError([f'{path} cannot be read: {error}']) from error
+    known = {entry['name'] for entry in Settings.describe()}
+    values: dict[str, Any] = {}
+    nodes = content.values() if isinstance(content, dict) else []
+    for node in nodes:
+        parameters = node.get('ros__parameters') if isinstance(node, dict) else None
+        if isinstance(parameters, dict):
+            values |= {name: value for name, value in parameters.items() if name in known}
+    if not values:
+        raise SettingsError([f'{path} holds no ros__parameters of estimator or detector'])
+    return values
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the command."""
+    words, ros_args = split_ros_args(args)
+    options = arguments(words)
+    failed: list[BagError] = []
+
+    def left_out(error: BagError) -> None:
+        if isinstance(error, NoMeasurementError):
+            print(f'replay: warning: {error}; it is left out', file=sys.stderr)
+        else:
+            failed.append(error)
+
+    try:
+        settings = settings_of(options)
+        if options.out:
+            check_format(options.out)
+        for folder in (options.out and options.out.parent, options.figures, options.bag):
+            if folder and folder != BESIDE:
+                make_folder(folder)
+        recordings = find_recordings(
+            options.bags, options.topic, parse_maps(options.map), options.actuator, left_out
+        )
+        plan = Plan(options.mode, settings, options.figures, options.bag)
+        if options.live:
+            from damadics_fd.commands.replay.live import publish
+
+            code = publish(recordings, plan, options.rate or 1.0, options.inputs_only, ros_args)
+            return max(code, report_errors(failed))
+        outcomes = replay_all(recordings, plan, options.jobs)
+        outcomes += [Outcome(str(error.path), plan.mode, error=str(error)) for error in failed]
+        if not all(outcome.error for outcome in outcomes):
+            print_table(outcomes)
+        for outcome in outcomes:
+            report_problems(outcome.problems)
+        if options.out:
+            write_outcomes(outcomes, options.out)
+    except (BagError, SettingsError, RuntimeError, OSError) as error:
+        print(f'replay: {error}', file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print('replay: stopped', file=sys.stderr)
+        return 130
+    return report_errors([outcome.error for outcome in outcomes if outcome.error])
+
+
+def report_problems(problems: Sequence[str]) -> None:
+    """Print the first few warnings and how many more there are."""
+    for problem in problems[:WARNINGS]:
+        print(f'replay: warning: {problem}', file=sys.stderr)
+    if len(problems) > WARNINGS:
+        print(f'replay: and {len(problems) - WARNINGS} more warnings like it', file=sys.stderr)
+
+
+def report_errors(errors: Sequence[object]) -> int:
+    """Print errors and return the exit code."""
+    for error in errors:
+        print(f'replay: {error}', file=sys.stderr)
+    return int(bool(errors))
+
+
+def replay_all(recordings: Sequence[Recording], plan: Plan, jobs: int) -> list[Outcome]:
+    """
+    Replay recordings over several processes with a progress bar.
+
+    :param recordings: what to replay.
+    :param plan: how.
+    :param jobs: processes at most.
+    :return: what became of each, in order.
+    """
+    stems = list(unique_stems(recordings))
+    tasks = [
+        (recording, _placed(plan, recording), stem)
+        for recording, stem in zip(recordings, stems, strict=True)
+    ]
+    with tqdm(unit=' samples', unit_scale=True, disable=None, leave=False) as bar:
+        if min(jobs, len(tasks)) <= 1:
+            warm_up([plan])
+            return [replay(recording, where, bar.update, stem) for recording, where, stem in tasks]
+        context = multiprocessing.get_context('spawn')
+        counter = context.Value('q', 0)
+        workers = min(jobs, len(tasks))
+        with ProcessPoolExecutor(
+            workers, context, initializer=_start, initargs=(counter, plan, workers)
+        ) as pool:
+            waiting = futures = [pool.submit(_work, *task) for task in tasks]
+            while waiting:
+                waiting = list(wait(waiting, timeout=0.2).not_done)
+                bar.update(counter.value - bar.n)
+            return [future.result() for future in futures]
+
+
+def _placed(plan: Plan, recording: Recording) -> Plan:
+    """Put bags next to the input where no folder is given."""
+    if plan.bags != BESIDE:
+        return plan
+    return Plan(plan.mode, plan.settings, plan.figures, recording.path.resolve().parent)
+
+
+def unique_stems(recordings: Sequence[Recording]) -> Iterator[str]:
+    """Yield a file name for each recording, no two alike."""
+    taken: set[str] = set()
+    for recording in recordings:
+        stem = _SUFFIX.sub('', recording.path.resolve().name)
+        if recording.table and recording.table.name:
+            stem += f'_{recording.table.name}'
+        elif recording.topic != '/measurement':
+            stem += recording.topic.removesuffix('measurement').rstrip('/').replace('/', '_')
+        names = chain([stem], (f'{stem}_{number}' for number in count(2)))
+        taken.add(stem := next(name for name in names if name not in taken))
+        yield stem
+
+
+def _start(counter: Any, plan: Plan, workers: int) -> None:
+    global _counter
+    _counter = counter
+    loading.THREADS = max(1, loading.THREADS // workers)  # the cores are busy
+    warm_up([plan])
+
+
+def _work(recording: Recording, plan: Plan, stem: str) -> Outcome:
+    def progress(count: int) -> None:
+        with _counter.get_lock():
+            _counter.value += count
+
+    return replay(recording, plan, progress, stem)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

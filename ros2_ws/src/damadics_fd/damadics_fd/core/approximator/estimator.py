@@ -1,0 +1,227 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""The estimator: one measurement in, one estimate out."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from damadics_fd.core import quality
+from damadics_fd.core.approximator.step import (
+    ESTIMATE,
+    LEARNED,
+    STATE,
+    Estimate,
+    progress,
+    start,
+    take_up,
+    update,
+)
+from damadics_fd.core.modes import PHASE_HOLD, PHASE_MONITOR, PHASE_PAPER, PHASES
+from damadics_fd.core.settings import Settings
+
+STILL = 600.0  # s without motion after which the status says so
+FAILED = 4.0  # s of refused samples after which the input counts as failed
+
+
+class Estimator:
+    """
+    Estimate velocity, residual and learned bound from one measurement after the other.
+
+    :param settings: all settings; `settings.mode` chooses paper or monitor mode.
+
+    >>> import math
+    >>> estimator = Estimator(Settings.for_mode('paper'))
+    >>> estimator.update(0, 1.0, 0.0, 3.5e6, 2.6e6, 20.0, 12.0, math.nan).phase
+    4
+    >>> estimator.update(2_500_000, 1.0, math.nan, 3.5e6, 2.6e6, 20.0, 12.0, math.nan)
+    >>> estimator.last_rejection
+    'not_finite: x1 = nan'
+    """
+
+    def __init__(self, settings: Settings) -> None:
+        self.settings = settings
+        self.quality = np.zeros(1, quality.DTYPE)
+        self.state = np.zeros(1, STATE)
+        self.last_rejection = ''
+        self._settings = settings.record()
+        self._estimate = np.zeros(1, ESTIMATE)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything: what was learned, the filters and the counters."""
+        self.quality[:] = np.zeros(1, quality.DTYPE)
+        self.state[:] = np.zeros(1, STATE)
+        self.last_rejection = ''
+        start(self.state, self._settings)
+
+    def update(self, stamp: int, cv: float, x1: float, p1: float, p2: float, t1: float,
+               flow: float, ps: float) -> Estimate | None:
+        """
+        Take one measurement, with the fields of damadics_msgs/Measurement.
+
+        :param stamp: sampling instant [ns].
+        :param cv: control value [1].
+        :param x1: stem position [1], 0 open, 1 closed.
+        :param p1: pressure before the valve [Pa].
+        :param p2: pressure behind the valve [Pa].
+        :param t1: temperature of the medium [degC].
+        :param flow: flow [kg/s].
+        :param ps: chamber pressure, gauge [Pa]; NaN where not measured.
+        :return: the estimate; None where the sample was refused, see `last_rejection`.
+        """
+        reason = update(self.quality, self.state, self._settings, self._estimate, stamp, cv, x1,
+                        p1, p2, t1, flow, ps)
+        if reason:
+            self.last_rejection = self._explain(reason, stamp, (cv, x1, p1, p2, t1, flow, ps))
+            return None
+        return Estimate._make(self._estimate.item())
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """
+        Return how many samples were accepted and refused for which reason, and interruptions.
+
+        :return: counts by name.
+        """
+        q = self.quality[0]
+        counts = {name: int(n) for name, n in zip(quality.REASONS, q.counts, strict=True)}
+        for name in ('gaps', 'missed', 'restarts', 'clock_jumps', 'refused_in_a_row'):
+            counts[name] = int(q[name])
+        return counts
+
+    @property
+    def failed_input(self) -> str:
+        """
+        Say what is wrong with the input where nothing else has come for `FAILED` seconds.
+
+        :return: signal, value, how long in nominal sample periods, remedy; '' where all is well.
+        """
+        lasting = int(self.quality[0].refused_in_a_row) / self.settings.sample_rate
+        if lasting < FAILED:
+            return ''
+        remedy = quality.REMEDIES[self.last_rejection.split(':')[0]]
+        return f'{self.last_rejection}, for {lasting:.0f} s: {remedy}'
+
+    @property
+    def phase(self) -> str:
+        """
+        Return the phase of the last estimate.
+
+        :return: a name out of `modes.PHASES`.
+        """
+        return PHASES[int(self.state[0].phase)]
+
+    @property
+    def status(self) -> str:
+        """
+        Say in one line what the estimator does and, where it learns for long, why.
+
+        :return: for people; never "monitoring" while it does not monitor.
+        """
+        s, c = self.state[0], self.settings
+        if self.quality[0].counts[quality.ACCEPTED] == 0:
+            return 'waiting for the first good sample'
+        if s.phase == PHASE_HOLD:
+            return 'on hold: the input was interrupted, the filters settle'
+        still = (s.elapsed - s.rested) * 1e-9
+        if s.phase in (PHASE_PAPER, PHASE_MONITOR):
+            if still > STILL:
+                return (f'monitoring limited, no excitation: the stem has not moved for '
+                        f'{still:.0f} s, a change of its friction cannot be seen')
+            return 'monitoring'
+        share = f'learning, {100.0 * progress(self.state, self._settings):.0f} %'
+        if s.unsettled:
+            return (f'{share}: learning was refused {int(s.unsettled)} times because the valve '
+                    f'changed meanwhile ({self._change()}); inspect it, then learn anew')
+        late = (s.elapsed - s.start) * 1e-9 >= c.t_learn
+        if late:
+            if s.travel < c.travel_min:
+                return (f'{share}: insufficient excitation, {float(s.travel):.2f} of '
+                        f'{c.travel_min:.2f} strokes travelled; move the valve both ways')
+            return (f'{share}: insufficient excitation, the stem moved too little of late or in '
+                    'one direction only; move the valve both ways over its stroke')
+        return share
+
+    @property
+    def monitoring(self) -> bool:
+        """
+        Tell whether decisions count.
+
+        :return: True in the phases `monitor` and `paper`.
+        """
+        return self.state[0].phase in (PHASE_PAPER, PHASE_MONITOR)
+
+    def learned(self) -> dict[str, Any]:
+        """
+        Return what was learned, to be kept over a restart.
+
+        :return: plain numbers and lists by name, fit for JSON.
+        :raises ValueError: where learning is not finished.
+        """
+        if not self.state[0].armed:
+            raise ValueError(f'nothing to save: {self.status}')
+        return {name: self.state[name][0].tolist() for name in LEARNED}
+
+    def restore(self, learned: Mapping[str, Any]) -> None:
+        """
+        Take up what `learned` returned and go to MONITOR as soon as the filters have settled.
+
+        :param learned: what was learned.
+        :raises ValueError: where it is not that, or beyond the bounds of the settings; the
+            estimator is then untouched.
+        """
+        state = self.state.copy()
+        wrong = sorted(set(learned) ^ set(LEARNED))
+        if wrong:
+            raise ValueError(f'learned state: {", ".join(wrong)} missing or unknown')
+        for name, value in learned.items():
+            try:
+                array = np.asarray(value, float)
+            except (TypeError, ValueError, OverflowError) as error:
+                raise ValueError(f'learned state: {name} = {value!r}: {error}') from error
+            if array.shape != state[name].shape[1:] or not np.isfinite(array).all():
+                raise ValueError(f'learned state: {name} = {value!r} does not fit')
+            state[name][0] = array
+        self._check_bounds(state)
+        take_up(state)
+        self.state[:] = state
+
+    def relearn(self, after_repair: bool = False) -> None:
+        """
+        Learn anew; filters and counters go on.
+
+        :param after_repair: take the valve as it is now for fault-free; else what is learned has
+            to agree with the first block that was ever learned or loaded.
+        """
+        if after_repair:
+            self.state['base'] = 0.0
+        self.state['unsettled'] = 0
+        self.state['start'] = self.state['elapsed']
+        start(self.state, self._settings)
+
+    def _check_bounds(self, state: NDArray[Any]) -> None:
+        s, c = state[0], self.settings
+        for name, nominal in (('ah1', c.alpha1), ('ah4', c.alpha4), ('ah5', c.alpha5)):
+            if abs(s[name] - nominal) > c.band * nominal * (1.0 + 1e-9):
+                raise ValueError(f'learned state: {name} = {float(s[name]):g} is not within '
+                                 f'{100.0 * c.band:g} % of {nominal:g}')
+        square = np.sum(s.w1**2) + np.sum(s.w2**2) + s.eps1**2 + s.b1**2
+        if square > (c.w_max * (1.0 + 1e-9))**2:
+            raise ValueError(f'learned state: the weights exceed w_max = {c.w_max:g}')
+
+    def _change(self) -> str:
+        offset, stiffness, friction = self.state[0].change
+        force = self.settings.stiffness * self.settings.stroke
+        return (f'friction {friction * force:+.0f} N, stiffness {100.0 * stiffness:+.1f} %, '
+                f'offset {offset * force:+.0f} N')
+
+    def _explain(self, reason: int, stamp: int, values: tuple[float, ...]) -> str:
+        name = quality.REASONS[reason]
+        if reason in (quality.NOT_FINITE, quality.OUT_OF_RANGE):
+            for index, value in enumerate(values):
+                if quality.judge_signal(self._settings, index, value) == reason:
+                    return f'{name}: {quality.SIGNALS[index]} = {value:g}'
+        return f'{name}: {stamp} ns after {int(self.quality[0].stamp)} ns'

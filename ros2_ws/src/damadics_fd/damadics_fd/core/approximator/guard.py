@@ -1,0 +1,249 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Guard against learning a fault: see that the valve stays the same while it is learned.
+
+The force balance of the moving stem, u - x1 - (alpha1/alpha5) x2 = offset + dK x1 + friction s
+with s the direction of motion, is fitted to blocks of the learning time by least squares with
+a weak prior. A block that differs from the first by more than the fits' own uncertainty and
+a tolerance means that stiffness or friction change; so does a force that leaves the fit of all
+blocks by more than the friction itself. What was learned is then thrown away. The fit of all
+blocks also tells what the approximator will meet where the stem has not been, or not gone that
+way.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from damadics_fd.core.approximator import network
+from damadics_fd.core.jit import jit
+
+N = 3  # offset, relative change of the stiffness, friction / (K L)
+SUMS = 11  # weight, upper triangle of S, q, square of the left side
+STATE = [('place', 'f8'), ('direction', 'f8'), ('moved', 'i8'), ('travel', 'f8'),
+         ('block', 'f8', (SUMS,)), ('base', 'f8', (SUMS,)), ('pool', 'f8', (SUMS,)),
+         ('block_end', 'i8'), ('proven', 'f8'), ('unsettled', 'i8'), ('distance', 'f8'),
+         ('change', 'f8', (N,)), ('theta', 'f8', (N,)), ('cov', 'f8', (N, N)), ('sigma', 'f8'),
+         ('drift', 'f8')]
+
+CORRELATION = 0.1  # s; samples closer than this count as one
+FRESH = 200_000_000  # ns after its last motion in which the stem counts as moving
+PRIOR = (0.05, 0.05, 0.02)  # standard deviations of offset, dK/K, friction
+SIGMA_MIN = 1e-3  # of K L: model error of the moving stem
+QUICK = 0.5  # s; mean over which a force that leaves the fit is judged
+ENOUGH = 8.0  # weight that makes a block comparable, in correlation times
+CONFIDENCE = 3.5  # standard deviations
+
+
+@jit
+def track(s: Any, x: float, band: float) -> float:
+    """
+    Follow the stem through a play, so that noise is no travel.
+
+    :param s: state record.
+    :param x: position [1].
+    :param band: half width of the play [1].
+    :return: the travel since the last call [1].
+    """
+    if abs(x - s.place) <= band:
+        return 0.0
+    s.direction = 1.0 if x > s.place else -1.0
+    step = x - s.direction * band - s.place
+    s.place += step
+    s.moved = s.elapsed
+    return abs(step)
+
+
+@jit
+def collect(s: Any, weight: float, x1: float, left: float) -> None:
+    """
+    Add a sample to the block.
+
+    :param s: state record.
+    :param weight: time step / CORRELATION.
+    :param x1: position [1].
+    :param left: u - x1 - (alpha1/alpha5) x2 [1].
+    """
+    b = s.block
+    b[0] += weight
+    b[1] += weight
+    b[2] += weight * x1
+    b[3] += weight * s.direction
+    b[4] += weight * x1 * x1
+    b[5] += weight * x1 * s.direction
+    b[6] += weight
+    b[7] += weight * left
+    b[8] += weight * left * x1
+    b[9] += weight * left * s.direction
+    b[10] += weight * left * left
+
+
+@jit
+def fit(b: Any, theta: Any, cov: Any) -> float:
+    """
+    Fit the force balance to the sums of a block.
+
+    :param b: sums, see `collect`.
+    :param theta: written: offset, dK/K, friction.
+    :param cov: written: their covariance.
+    :return: standard deviation of the force from the fit / (K L).
+    """
+    sigma = SIGMA_MIN
+    for _ in range(2):  # with the least sigma, then with the one found
+        scale = 1.0 / (sigma * sigma)
+        k = 1
+        for i in range(N):
+            for j in range(i, N):
+                cov[i, j] = cov[j, i] = b[k] * scale
+                k += 1
+            cov[i, i] += 1.0 / (PRIOR[i] * PRIOR[i])
+        invert(cov)
+        left = b[10]
+        for i in range(N):
+            theta[i] = scale * (cov[i, 0] * b[7] + cov[i, 1] * b[8] + cov[i, 2] * b[9])
+        k = 1
+        for i in range(N):
+            left -= 2.0 * theta[i] * b[7 + i]
+            for j in range(i, N):
+                left += (1.0 if i == j else 2.0) * theta[i] * theta[j] * b[k]
+                k += 1
+        sigma = max(SIGMA_MIN, math.sqrt(max(left, 0.0) / max(b[0] - N, 1.0)))
+    return sigma
+
+
+@jit
+def invert(a: Any) -> None:
+    """
+    Invert a symmetric positive definite matrix in place by Gauss-Jordan elimination.
+
+    :param a: the matrix.
+    """
+    for p in range(N):
+        pivot = 1.0 / a[p, p]
+        a[p, p] = 1.0
+        for j in range(N):
+            a[p, j] *= pivot
+        for i in range(N):
+            if i != p:
+                factor = a[i, p]
+                a[i, p] = 0.0
+                for j in range(N):
+                    a[i, j] -= factor * a[p, j]
+
+
+@jit
+def compare(s: Any, c: Any) -> None:
+    """
+    Set the distance of the block from the first one, and the change of the parameters.
+
+    :param s: state record: distance, change out.
+    :param c: settings record: what change of offset, stiffness and friction is tolerated.
+    """
+    theta, cov = np.zeros(N), np.zeros((N, N))
+    fit(s.block, theta, cov)
+    for i in range(N):
+        s.change[i] = theta[i] - s.theta[i]
+        for j in range(N):
+            cov[i, j] += s.cov[i, j]
+    cov[0, 0] += c.settled_stiffness * c.settled_stiffness / 4.0
+    cov[1, 1] += c.settled_stiffness * c.settled_stiffness
+    cov[2, 2] += c.settled_friction * c.settled_friction
+    invert(cov)
+    s.distance = 0.0
+    for i in range(N):
+        for j in range(N):
+            s.distance += s.change[i] * cov[i, j] * s.change[j]
+
+
+@jit
+def close_block(s: Any, c: Any) -> bool:
+    """
+    End a block: keep it as the first one or compare it; add it to the pool of all.
+
+    :param s: state record: proven out, the bound that was learned on a valve that stayed the same.
+    :param c: settings record.
+    :return: False where the valve has changed.
+    """
+    same = True
+    if s.block[0] >= ENOUGH:
+        if s.base[0] == 0.0:
+            s.base[:] = s.block
+            s.pool[:] = 0.0
+        else:
+            s.sigma = fit(s.base, s.theta, s.cov)
+            compare(s, c)
+            same = s.distance <= c.settled_max
+            s.proven = network.bound(s, 0.0)
+        if same:
+            s.pool[:] += s.block
+            s.sigma = fit(s.pool, s.theta, s.cov)
+    s.block[:] = 0.0
+    return same
+
+
+@jit
+def foreseen(s: Any, stiffness: float, noise: float, low: float, high: float) -> float:
+    """
+    Return the force the approximator will have to explain in the worst place of the stroke.
+
+    The force balance leaves most at an end of the stroke, in one of the directions. To it come
+    CONFIDENCE standard deviations of the noise or of the fit itself, whichever is larger.
+
+    :param s: state record with the fit of all blocks.
+    :param stiffness: the relative change of it that alpha5 has learned.
+    :param noise: standard deviation of the force / (K L).
+    :param low: position at the lower end, with preload [1].
+    :param high: position at the upper end, with preload [1].
+    :return: force / (K L).
+    """
+    most = 0.0
+    for x1 in (low, high):
+        for d in (-1.0, 1.0):
+            left = abs(s.theta[0] + (s.theta[1] - stiffness) * x1 + s.theta[2] * d)
+            sigma = math.sqrt(max(spread(s, x1, d), 0.0))
+            most = max(most, left + CONFIDENCE * max(noise, sigma))
+    return most
+
+
+@jit
+def spread(s: Any, x1: float, d: float) -> float:
+    """
+    Return the variance of the force that the fit predicts.
+
+    :param s: state record with the fit of all blocks.
+    :param x1: position [1].
+    :param d: direction of motion, -1 or 1.
+    :return: variance [1].
+    """
+    return float(s.cov[0, 0] + s.cov[1, 1] * x1 * x1 + s.cov[2, 2]
+                 + 2.0 * (s.cov[0, 1] * x1 + s.cov[0, 2] * d + s.cov[1, 2] * x1 * d))
+
+
+@jit
+def strays(s: Any, c: Any, dt: float, x1: float, left: float) -> bool:
+    """
+    Tell whether the force has left the fit by more than friction and noise explain.
+
+    :param s: state record: drift in and out.
+    :param c: settings record.
+    :param dt: time step [s].
+    :param x1: position [1].
+    :param left: u - x1 - (alpha1/alpha5) x2 [1].
+    :return: True where it has.
+    """
+    if s.base[0] == 0.0:
+        return False
+    d = s.direction
+    error = left - s.theta[0] - s.theta[1] * x1 - s.theta[2] * d
+    s.drift += min(dt / QUICK, 1.0) * (error - s.drift)
+    noise = (5.0 * s.sigma * math.sqrt(CORRELATION / QUICK)
+             + 4.0 * math.sqrt(max(spread(s, x1, d), 0.0)))
+    friction = max(s.theta[2], math.sqrt(s.cov[2, 2]), c.settled_friction)
+    if abs(s.drift) <= 1.5 * friction + noise:
+        return False
+    s.change[0] = s.drift
+    s.change[1] = 0.0
+    s.change[2] = 0.0
+    return True

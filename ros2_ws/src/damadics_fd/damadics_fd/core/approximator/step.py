@@ -1,0 +1,217 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""The estimator's step: check, filter, observe, learn; compiled."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from damadics_fd.core import quality
+from damadics_fd.core.approximator import learning, observer, velocity
+from damadics_fd.core.jit import jit, layer
+from damadics_fd.core.modes import MONITOR, PAPER, PHASE_PAPER
+
+SUBSTEPS = 1000  # at most, in one gap
+LARGEST_K2_DT = 1.5  # step of the printed observer, which is unstable from 2.8 on
+ESTIMATE = np.dtype((np.record, np.dtype([
+    ('stamp', 'i8'), ('x2', 'f8'), ('x1_hat', 'f8'), ('x2_hat', 'f8'), ('xi1', 'f8'),
+    ('xi2', 'f8'), ('phi', 'f8'), ('alpha1', 'f8'), ('alpha4', 'f8'), ('alpha5', 'f8'),
+    ('x1', 'f8'), ('u', 'f8'), ('ps', 'f8'), ('dp', 'f8'), ('progress', 'f8'), ('phase', 'i8'),
+])))
+STATE = np.dtype((np.record, np.dtype([
+    *learning.STATE, *velocity.STATE, *observer.STATE,
+], align=True)))
+LEARNED = ('ah1', 'ah4', 'ah5', 'w1', 'w2', 'eps1', 'b1', 'base', 'theta', 'cov', 'sigma')
+
+
+class Estimate(NamedTuple):
+    """Hold one result of the estimator, with the fields of damadics_msgs/Estimate."""
+
+    stamp: int  # ns
+    x2: float
+    x1_hat: float
+    x2_hat: float
+    xi1: float
+    xi2: float
+    phi: float
+    alpha1: float
+    alpha4: float
+    alpha5: float
+    x1: float
+    u: float
+    ps: float
+    dp: float
+    progress: float
+    phase: int
+
+    @property
+    def alpha_hat(self) -> tuple[float, float, float]:
+        """
+        Return the estimates of alpha1, alpha4, alpha5.
+
+        :return: [1/s, 1/s2, 1/s2].
+        """
+        return self.alpha1, self.alpha4, self.alpha5
+
+
+@layer
+def advance(s: Any, c: Any, phase: int, dt: float, x1_0: float, x2_0: float, u_0: float,
+            x1: float, x2: float, u: float) -> None:
+    """
+    Advance observer and, where the phase allows it, adaptation by one step.
+
+    :param s: state record.
+    :param c: settings record.
+    :param phase: phase of the estimator.
+    :param dt: time step [s].
+    :param x1_0: position at the start of the step, filtered [1].
+    :param x2_0: velocity there [1/s].
+    :param u_0: input there, filtered [1].
+    :param x1: position at the end of the step, filtered [1].
+    :param x2: velocity there [1/s].
+    :param u: input there, filtered [1].
+    """
+    if phase == PHASE_PAPER:
+        observer.observe_printed(s, c, dt, x1_0, x2_0, u_0, x1, x2, u)
+    else:
+        observer.observe(s, c, dt, x1, x2, u)
+    learning.adapt(s, c, phase, dt, x1, x2, u)
+
+
+@jit
+def step(q: Any, s: Any, c: Any, e: Any, stamp: int, cv: float, x1: float, p1: float, p2: float,
+         t1: float, flow: float, ps: float) -> int:
+    """
+    Take one sample.
+
+    :param q: quality record.
+    :param s: state record; untouched where the sample is refused.
+    :param c: settings record.
+    :param e: estimate record, written where the sample is accepted.
+    :param stamp: stamp [ns].
+    :param cv: control value [1].
+    :param x1: stem position [1].
+    :param p1: pressure before the valve [Pa].
+    :param p2: pressure behind the valve [Pa].
+    :param t1: temperature of the medium [degC].
+    :param flow: flow [kg/s].
+    :param ps: chamber pressure, gauge [Pa].
+    :return: quality.ACCEPTED or the reason of refusal.
+    """
+    reason = quality.check_values(c, cv, x1, p1, p2, t1, flow, ps)
+    if reason == quality.ACCEPTED:
+        reason = quality.check_stamp(q, c, stamp)
+    first = q.counts[quality.ACCEPTED] == 0
+    dt = quality.admit(q, c, stamp, reason)
+    if reason != quality.ACCEPTED:
+        return reason
+
+    y = x1 + c.preload
+    afresh = dt < 0.0
+    if afresh:
+        dt = -dt
+        velocity.restart(s, y)
+        observer.restart(s, y)
+        if first:
+            s.place = x1
+        if s.armed or not first:
+            s.held_until = s.elapsed + int(c.hold * 1e9)
+    else:
+        s.elapsed += int(dt * 1e9 + 0.5)
+    x1_before, x2_before, u_before = s.x1, s.x2, s.u
+    smooth = velocity.filter_position(s, c, dt, y)
+    u = cv
+    if c.mode == MONITOR:
+        u = force.force_input(c, smooth - c.preload, p1, p2, ps)
+    if afresh:
+        velocity.restart_input(s, u)
+    velocity.filter_input(s, c, dt, u)
+
+    if afresh:  # there is no step before the first sample
+        x1_before, x2_before, u_before = s.x1, s.x2, s.u
+        dt = 0.0 if c.mode == PAPER else dt
+
+    phase = learning.phase_of(s, c)
+    parts = max(1, int(dt * c.sample_rate / 1.5) + 1)
+    if c.mode == PAPER:
+        parts = max(parts, int(dt * c.k2 / LARGEST_K2_DT) + 1)
+    parts = min(parts, SUBSTEPS)
+    x1_0, x2_0, u_0 = x1_before, x2_before, u_before
+    for i in range(1, parts + 1):  # a gap is bridged on straight lines between filtered signals
+        part = i / parts
+        x1_1 = x1_before + part * (s.x1 - x1_before) if i < parts else s.x1
+        x2_1 = x2_before + part * (s.x2 - x2_before) if i < parts else s.x2
+        u_1 = u_before + part * (s.u - u_before) if i < parts else s.u
+        advance(s, c, phase, dt / parts, x1_0, x2_0, u_0, x1_1, x2_1, u_1)
+        x1_0, x2_0, u_0 = x1_1, x2_1, u_1
+
+    learning.follow(s, c, phase, dt)
+
+    e.stamp = stamp
+    e.x2 = s.x2
+    e.x1_hat = s.xh1
+    e.x2_hat = s.xh2
+    e.xi1 = s.xi1
+    e.xi2 = s.xi2
+    e.phi = s.phi
+    e.alpha1 = s.ah1
+    e.alpha4 = s.ah4
+    e.alpha5 = s.ah5
+    e.x1 = x1
+    e.u = u
+    e.ps = ps
+    e.dp = p1 - p2
+    e.progress = learning.progress_of(s, c)
+    e.phase = phase
+    s.phase = phase
+    return reason
+
+
+@jit
+def update(q: NDArray, s: NDArray, c: NDArray, e: NDArray, stamp: int, cv: float, x1: float,
+           p1: float, p2: float, t1: float, flow: float, ps: float) -> int:
+    """
+    Take one sample; `step` for arrays of length 1, to be called from Python.
+
+    :param q: quality state.
+    :param s: estimator state.
+    :param c: settings.
+    :param e: estimate.
+    :param stamp: the rest is the sample as in `step`.
+    :return: quality.ACCEPTED or the reason of refusal.
+    """
+    return step(q[0], s[0], c[0], e[0], stamp, cv, x1, p1, p2, t1, flow, ps)
+
+
+@jit
+def start(s: NDArray, c: NDArray) -> None:
+    """
+    Set an estimator state to "nothing learned".
+
+    :param s: estimator state.
+    :param c: settings.
+    """
+    learning.forget(s[0], c[0])
+
+
+@jit
+def take_up(s: NDArray) -> None:
+    """
+    Go to MONITOR with what the state has learned, as soon as the filters have settled.
+
+    :param s: estimator state.
+    """
+    learning.arm(s[0])
+
+
+@jit
+def progress(s: NDArray, c: NDArray) -> float:
+    """
+    Return the share of the learning that is done.
+
+    :param s: estimator state.
+    :param c: settings.
+    :return: 0..1.
+    """
+    return learning.progress_of(s[0], c[0])

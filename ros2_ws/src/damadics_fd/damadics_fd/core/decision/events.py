@@ -1,0 +1,105 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Transitions of an alarm with their evidence, as damadics_msgs/FaultEvent carries them."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from damadics_fd.core.decision.alarm import (
+    CHANGED,
+    CLEARED,
+    FAILURE,
+    FUNCTION_CHECK,
+    MAINTENANCE_REQUIRED,
+    NE107,
+    NEAR_MISS,
+    NORMAL,
+    OUT_OF_SPECIFICATION,
+    RAISED,
+    SHELVED,
+    TRANSITIONS,
+    UNSHELVED,
+)
+from damadics_fd.core.signature.state import CAUSES, known
+
+STUCK = 5.0  # s without motion that are worth a word in the text of an alarm
+ADVICE = {
+    NORMAL: '',
+    MAINTENANCE_REQUIRED: 'acknowledge; plan an inspection of packing, spring and sensors',
+    OUT_OF_SPECIFICATION: 'acknowledge; inspect packing, spring and sensors soon',
+    FUNCTION_CHECK: 'alarms are shelved: inspect when the shelf ends',
+    FAILURE: 'acknowledge; inspect packing, spring and sensors now, consider manual operation',
+}
+
+
+@dataclass(frozen=True)
+class Event:
+    """Hold one transition of the alarm; stamps in ns."""
+
+    transition: int  # as in damadics_msgs/FaultEvent
+    stamp: int
+    occurrence: int
+    level: int  # NAMUR NE 107
+    onset: int
+    residual: float  # [1/s]
+    threshold: float  # [1/s]
+    ratio: float  # largest residual / threshold of this fault so far
+    duration: float  # [s] since the onset
+    cause: str = ''
+    confidence: float = math.nan
+    strength: float = math.nan  # change in the unit of the cause
+    spread: float = math.nan  # its standard deviation
+    text: str = ''
+    advice: str = ''
+
+    @property
+    def name(self) -> str:
+        """
+        Return the name of the transition.
+
+        :return: a name out of `alarm.TRANSITIONS`.
+        """
+        return TRANSITIONS[self.transition]
+
+
+def events_of(decision: Any) -> tuple[Event, ...]:
+    """
+    List the transitions in a decision.
+
+    :param decision: a `Decision`.
+    :return: one event per transition, with the evidence.
+    """
+    bits = int(decision.transitions)
+    return tuple(_event(n, decision) for n in range(len(TRANSITIONS)) if bits >> n & 1)
+
+
+def _event(transition: int, d: Any) -> Event:
+    strength, spread, confidence = known(d.strength, d.spread, d.confidence)
+    duration = max(int(d.stamp) - int(d.onset), 0) * 1e-9 if d.onset else 0.0
+    return Event(transition, int(d.stamp), int(d.occurrence), int(d.level), int(d.onset),
+                 float(d.residual), float(d.threshold), float(d.peak), duration,
+                 CAUSES[int(d.cause)] if d.cause else '', confidence, strength, spread,
+                 text=_text(transition, d, duration), advice=_advice(transition, d))
+
+
+def _text(transition: int, d: Any, duration: float) -> str:
+    name = TRANSITIONS[transition].replace('_', ' ')
+    number = '' if transition in (SHELVED, UNSHELVED, NEAR_MISS) else f' {int(d.occurrence)}'
+    text = (f'{name}{number}: velocity residual {float(d.ratio):.2f} x threshold '
+            f'({float(d.residual):.3g} / {float(d.threshold):.3g} 1/s)')
+    if transition in (RAISED, CHANGED):
+        text += f' for {duration:.3g} s, {NE107[int(d.level)]}'
+    elif transition == CLEARED:
+        text += f', at most {float(d.peak):.2f} x in {duration:.3g} s'
+    if transition in (RAISED, CHANGED) and d.still > STUCK:
+        text += f'; position frozen for {float(d.still):.0f} s: stem or position sensor'
+    return text
+
+
+def _advice(transition: int, d: Any) -> str:
+    if transition in (RAISED, CHANGED):
+        return ADVICE[int(d.level)]
+    if transition == CLEARED:
+        return 'acknowledge; reset after inspection or repair'
+    return ''

@@ -1,0 +1,170 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Judge estimates: threshold, alarm, signature and class; the hot loop of the detector."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from damadics_fd.core.approximator.threshold import threshold
+from damadics_fd.core.decision import alarm, vote
+from damadics_fd.core.jit import jit, layer
+from damadics_fd.core.modes import PHASE_HOLD, PHASE_PAPER
+from damadics_fd.core.signature import step as signature_step
+
+LARGE = 1e9  # ratio to a threshold of zero
+DECISION = np.dtype((np.record, np.dtype([
+    ('stamp', 'i8'), ('residual', 'f8'), ('threshold', 'f8'), ('ratio', 'f8'), ('exceed', '?'),
+    ('fault', '?'), ('state', 'i8'), ('level', 'i8'), ('since', 'i8'), ('onset', 'i8'),
+    ('occurrence', 'i8'), ('acknowledged', '?'), ('peak', 'f8'), ('still', 'f8'),
+    ('cause', 'i8'), ('strength', 'f8'), ('spread', 'f8'), ('confidence', 'f8'),
+    ('transitions', 'i8'),
+], align=True)))
+STATE = np.dtype((np.record, np.dtype([
+    *vote.STATE, *alarm.STATE, ('place', 'f8'), ('moved', 'i8'), ('told', 'i8'),
+], align=True)))
+STIR = 0.01  # of the stroke: less is no motion of the stem
+
+
+@layer
+def step(s: Any, c: Any, g: Any, gc: Any, e: Any, d: Any) -> None:
+    """
+    Judge one estimate.
+
+    :param s: state record.
+    :param c: settings record.
+    :param g: state record of the signature.
+    :param gc: settings record of the signature.
+    :param e: estimate record.
+    :param d: decision record: what `report` does not tell is written.
+    """
+    armed = vote.armed(e.phase)
+    residual = abs(e.xi2)
+    rho = threshold(c, e.phi, e.alpha1)
+    ratio = min(residual / rho, LARGE) if rho > 0.0 else LARGE
+    # before anything moves both are 0 in paper mode: no evidence, though 0 >= 0
+    exceed = armed and residual >= rho and residual > 0.0 and not vote.gated(c, e)
+    level = 0
+    if armed:
+        level = vote.vote(s, c, exceed, ratio)
+    else:
+        vote.clear(s)
+    cause = g.cause
+    ready = e.phase not in (PHASE_PAPER, PHASE_HOLD)
+    signature_step.step(g, gc, e.stamp, e.x1, e.ps, e.dp, ready, s.active or s.latched)
+    own = signature_step.own_level(g, gc)
+    d.transitions = alarm.step(s, c, e.stamp, armed or g.own != 0, exceed or own > 0,
+                               s.count[0] > 0, max(level, own), ratio)
+    present = s.active or s.latched
+    if g.cause != cause or not present:
+        s.told = alarm.NORMAL
+        if present:
+            d.transitions |= 1 << alarm.CHANGED
+    d.residual = residual
+    d.threshold = rho
+    d.ratio = ratio
+    d.exceed = exceed
+    if s.moved < 0 or e.stamp < s.moved or abs(e.x1 - s.place) > STIR:
+        s.place = e.x1
+        s.moved = e.stamp
+    if s.flag:
+        shown = class_of(s, g, gc, armed)
+        if shown != s.told and d.transitions == 0:  # any other event tells the class as well
+            d.transitions = 1 << alarm.CHANGED
+        s.told = shown
+
+
+@jit
+def class_of(s: Any, g: Any, gc: Any, armed: bool) -> int:
+    """
+    Return the NAMUR NE 107 class that is shown: the worse of residual and cause.
+
+    :param s: state record.
+    :param g: state record of the signature.
+    :param gc: settings record of the signature.
+    :param armed: decisions count.
+    :return: a class; normal for a change too small for maintenance.
+    """
+    level: int = alarm.level_of(s, armed)
+    if not s.flag:
+        return level
+    if s.peak < 1.0 and not signature_step.material(g, gc, s.told > alarm.NORMAL):
+        return alarm.NORMAL  # the approximator is content and the change is small
+    return max(level, int(gc.ne107[g.cause]))
+
+
+@jit
+def report(s: Any, g: Any, gc: Any, e: Any, d: Any) -> None:
+    """
+    Copy the state of the alarm into a decision.
+
+    :param s: state record.
+    :param g: state record of the signature.
+    :param gc: settings record of the signature.
+    :param e: estimate record.
+    :param d: decision record, written.
+    """
+    armed = vote.armed(e.phase)
+    d.stamp = e.stamp
+    d.state = alarm.state_of(s, armed, e.phase)
+    d.level = class_of(s, g, gc, armed)
+    d.fault = s.flag
+    d.since = s.since
+    d.onset = s.onset if s.active or s.latched else 0
+    d.occurrence = s.occurrence
+    d.acknowledged = s.acknowledged
+    d.peak = s.peak
+    d.still = (e.stamp - s.moved) * 1e-9
+    d.cause = g.cause
+    d.strength = g.cause_value
+    d.spread = g.cause_std
+    d.confidence = g.confidence
+
+
+@jit
+def judge(s: NDArray, c: NDArray, g: NDArray, gc: NDArray, reason: NDArray, e: NDArray,
+          d: NDArray, keep: bool, first: int) -> tuple[int, int]:
+    """
+    Judge estimates one after the other: live one of them, in a recording all.
+
+    :param s: detector state.
+    :param c: settings.
+    :param g: state of the signature.
+    :param gc: settings of the signature.
+    :param reason: 0 where there is an estimate.
+    :param e: estimates.
+    :param d: decisions, written where there is an estimate.
+    :param keep: keep a row for each; otherwise only decisions with a transition, as many as
+        there is room for.
+    :param first: row to begin with.
+    :return: the row after the last one, and the number of decisions with a transition.
+    """
+    kept = 0
+    for i in range(first, len(e)):
+        if reason[i] != 0:
+            continue
+        row = i if keep else kept
+        step(s[0], c[0], g[0], gc[0], e[i], d[row])
+        news = d[row].transitions != 0
+        if keep or news:
+            report(s[0], g[0], gc[0], e[i], d[row])
+        if news:
+            kept += 1
+            if not keep and kept == len(d):
+                return i + 1, kept
+    return len(e), kept
+
+
+@jit
+def show(s: NDArray, g: NDArray, gc: NDArray, e: NDArray, d: NDArray) -> None:
+    """
+    Copy the state of the alarm into a decision; `report` for arrays of length 1.
+
+    :param s: detector state.
+    :param g: state of the signature.
+    :param gc: settings of the signature.
+    :param e: the latest estimate.
+    :param d: decision, written.
+    """
+    report(s[0], g[0], gc[0], e[0], d[0])

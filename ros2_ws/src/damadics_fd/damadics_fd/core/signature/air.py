@@ -1,0 +1,168 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Air supply: the top rate at which the chamber fills and vents, against the learned one.
+
+A positioner far from its set-point opens fully, so the best strokes show the capacity of the
+air supply whatever the valve does. With less supply pressure the chamber fills slower and vents
+as before; a leak of the chamber fills it slower and vents it faster.
+"""
+
+import math
+from typing import Any
+
+from damadics_fd.core.jit import jit
+from damadics_fd.core.signature.state import FILL, STROKES, VENT
+
+P_ATM = 101325.0  # [Pa]
+ALIKE = 0.9  # [1] strokes at full opening differ by 4 % at most, those of ramps by 10 to 40 %
+P_FLOOR = 5e3  # [Pa] less driving pressure than this says nothing
+MIN_STROKE = 0.15  # [1] a shorter stroke may not reach its top rate; holding against P1 does not
+
+
+@jit
+def track_air(s: Any, c: Any, learn: bool) -> bool:
+    """
+    Follow the filling and venting of the chamber over the newest three blocks.
+
+    :param s: state record.
+    :param c: settings record.
+    :param learn: True while what is seen may become the reference.
+    :return: True if a stroke has ended and the rates are new.
+    """
+    ps0 = s.bp[0] * c.force_scale / c.diaphragm_area
+    ps2 = s.bp[2] * c.force_scale / c.diaphragm_area
+    swept = c.diaphragm_area * c.stroke
+    air0 = (P_ATM + ps0) * (c.chamber_volume + swept * s.bx[0])  # [J] m R T
+    air2 = (P_ATM + ps2) * (c.chamber_volume + swept * s.bx[2])
+    rate = (air2 - air0) / (s.bt[2] - s.bt[0])
+    ps = 0.5 * (ps0 + ps2)
+    way = FILL if rate > 0.0 else VENT
+    drive = c.supply_pressure - ps if way == FILL else ps
+    if drive < P_FLOOR:
+        return False
+    y = abs(rate) / math.sqrt(drive)
+    ended = False
+    if way != s.air_way:
+        ended = end_stroke(s, learn)
+        s.air_way = way
+        s.air_n = 0
+        s.air_moved = 0.0
+        s.air_top = 0.0
+        s.air_second = 0.0
+    s.air_n += 1
+    s.air_moved += 0.5 * (s.bx[2] - s.bx[0])
+    if y > s.air_top:
+        s.air_second = s.air_top
+        s.air_top = y
+        s.air_ps = ps
+    else:
+        s.air_second = max(s.air_second, y)
+    return ended
+
+
+@jit
+def end_stroke(s: Any, learn: bool) -> bool:
+    """
+    Take the second best rate of a stroke into the reference or the latest strokes.
+
+    :param s: state record.
+    :param learn: True while what is seen may become the reference.
+    :return: True if the present rates are new.
+    """
+    way = s.air_way
+    if abs(s.air_moved) < MIN_STROKE:
+        return False
+    if s.air_learned[way] < STROKES:
+        if learn:
+            s.air_learned[way] += 1
+            s.air_ref[way] = max(s.air_ref[way], s.air_second)
+        return False
+    slot = s.air_count[way] % STROKES
+    s.air_ring[way, slot] = s.air_second
+    s.air_ring_ps[way, slot] = s.air_ps
+    s.air_count[way] += 1
+    if s.air_count[way] < STROKES:
+        return False
+    best = 0
+    for i in range(STROKES):
+        if s.air_ring[way, i] > s.air_ring[way, best]:
+            best = i
+    s.air_rate[way] = s.air_ring[way, best] / s.air_ref[way]
+    s.air_rate_ps[way] = s.air_ring_ps[way, best]
+    return True
+
+
+@jit
+def supply_lost(s: Any, c: Any) -> bool:
+    """
+    Tell whether the chamber fills slower than learned while it vents as before.
+
+    :param s: state record.
+    :param c: settings record.
+    :return: True if it does, by more than the settings allow.
+    """
+    enough = s.air_count[FILL] >= STROKES and s.air_count[VENT] >= STROKES
+    lost: bool = (
+        enough
+        and s.air_rate[FILL] < 1.0 - c.material_supply
+        and abs(s.air_rate[VENT] - 1.0) < 0.5 * c.material_supply
+    )
+    return lost
+
+
+@jit
+def strokes_agree(s: Any) -> bool:
+    """
+    Tell whether the latest strokes filled the chamber alike, as they do at full opening.
+
+    :param s: state record; the ring of filling rates is full.
+    :return: False where the positioner followed slow ramps, which never open it.
+    """
+    low = high = s.air_ring[FILL, 0]
+    for i in range(1, STROKES):
+        low = min(low, s.air_ring[FILL, i])
+        high = max(high, s.air_ring[FILL, i])
+    agree: bool = low > ALIKE * high
+    return agree
+
+
+@jit
+def supply_change(s: Any, c: Any) -> float:
+    """
+    Estimate the change of the supply pressure from the filling rate.
+
+    :param s: state record.
+    :param c: settings record.
+    :return: [Pa], negative for a loss.
+    """
+    ps = s.air_rate_ps[FILL]
+    change: float = (s.air_rate[FILL] ** 2 - 1.0) * (c.supply_pressure - ps)
+    return change
+
+
+@jit
+def restart_air(s: Any) -> None:
+    """
+    Judge the rates on strokes to come only.
+
+    :param s: state record.
+    """
+    for way in range(2):
+        s.air_count[way] = 0
+        s.air_rate[way] = math.nan
+
+
+@jit
+def forget_air(s: Any) -> None:
+    """
+    Learn the rates anew.
+
+    :param s: state record.
+    """
+    s.air_way = FILL
+    s.air_n = 0
+    for way in range(2):
+        s.air_learned[way] = 0
+        s.air_ref[way] = 0.0
+    restart_air(s)

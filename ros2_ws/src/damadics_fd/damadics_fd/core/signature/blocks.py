@@ -1,0 +1,216 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Block means of 0.1 s: hum of 50 Hz and 60 Hz cancels, the rest of the noise becomes white.
+
+The force is computed from the measured pressures and the raw position, so that position and
+force of a block share their time; a filtered force lags behind by several block's noise.
+"""
+
+import math
+from typing import Any
+
+from damadics_fd.core.jit import jit
+from damadics_fd.core.signature.state import (
+    LAG,
+    N_TABLE,
+    ONE,
+    PB,
+    POS,
+    POSX,
+    SIGN,
+    SIGN_T,
+    STRIBECK,
+    TABLE,
+    X1,
+    X1_T,
+    G,
+    V,
+)
+
+SLOPE = 0.015  # [1] the slope of the plug force is taken over +- this part of the stroke
+MPA = 1e6
+
+
+@jit
+def plug_gain(c: Any, x: float) -> float:
+    """
+    Interpolate the plug force per pressure difference.
+
+    :param c: settings record.
+    :param x: position / stroke.
+    :return: A_plug / (FN Km(x)) in 1/Pa.
+    """
+    i = 1
+    while i < c.plug_n - 1 and x > c.plug_x[i]:
+        i += 1
+    share = (x - c.plug_x[i - 1]) / (c.plug_x[i] - c.plug_x[i - 1])
+    share = min(max(share, 0.0), 1.0)
+    km = c.plug_km[i - 1] + share * (c.plug_km[i] - c.plug_km[i - 1])
+    gain: float = c.plug_area / (c.force_scale * km)
+    return gain
+
+
+@jit
+def open_block(s: Any, index: int) -> None:
+    """
+    Start a new block.
+
+    :param s: state record.
+    :param index: number of the block since the start.
+    """
+    s.index = index
+    s.n = 0
+    s.sx = 0.0
+    s.su = 0.0
+    s.sp = 0.0
+    s.sg = 0.0
+    s.st = 0.0
+
+
+@jit
+def add_sample(s: Any, c: Any, offset: float, x: float, ps: float, dp: float) -> None:
+    """
+    Add one sample to the block under construction.
+
+    :param s: state record.
+    :param c: settings record.
+    :param offset: [s] time since the start.
+    :param x: raw position / stroke.
+    :param ps: [Pa] chamber pressure, gauge.
+    :param dp: [Pa] P1 - P2.
+    """
+    pb = c.diaphragm_area * ps / c.force_scale
+    s.n += 1
+    s.sx += x
+    s.sp += pb
+    s.su += c.weight / c.force_scale + pb - dp * plug_gain(c, x)
+    s.sg += dp
+    s.st += offset
+
+
+@jit
+def close_block(s: Any, c: Any) -> bool:
+    """
+    Finish the block under construction and shift it into the history of three.
+
+    :param s: state record.
+    :param c: settings record.
+    :return: True if three successive blocks are whole, so that the middle one can be judged.
+    """
+    if s.n < c.min_samples:
+        s.run = 0  # a block is judged with its two neighbours: this discards them too
+        return False
+    for i in range(2):
+        s.bx[i] = s.bx[i + 1]
+        s.bu[i] = s.bu[i + 1]
+        s.bp[i] = s.bp[i + 1]
+        s.bdp[i] = s.bdp[i + 1]
+        s.bt[i] = s.bt[i + 1]
+    s.bx[2] = s.sx / s.n
+    s.bu[2] = s.su / s.n
+    s.bp[2] = s.sp / s.n
+    s.bdp[2] = s.sg / s.n
+    s.bt[2] = s.st / s.n
+    s.run += 1
+    whole: bool = s.run >= 3
+    return whole
+
+
+@jit
+def table_node(x: float) -> tuple[int, float]:
+    """
+    Find the nodes of the plug force correction around a position.
+
+    :param x: position / stroke.
+    :return: lower node and the share of the upper one.
+    """
+    node = min(max(x, 0.0), 1.0) * (N_TABLE - 1)
+    i = min(int(node), N_TABLE - 2)
+    return i, node - i
+
+
+@jit
+def table_force(s: Any, c: Any, x: float, dp: float) -> float:
+    """
+    Return the learned correction of the plug force.
+
+    :param s: state record.
+    :param c: settings record.
+    :param x: position / stroke.
+    :param dp: [Pa] P1 - P2.
+    :return: force / FN.
+    """
+    i, share = table_node(x)
+    correction = (1.0 - share) * s.theta[TABLE + i] + share * s.theta[TABLE + i + 1]
+    force: float = correction * dp * plug_gain(c, x)
+    return force
+
+
+@jit
+def regressor(s: Any, c: Any, slow: float) -> None:
+    """
+    Fill the regressor of the model and of every hypothesis (2.2, 2.4).
+
+    :param s: state record: x, v and the middle block are read, ph is written.
+    :param c: settings record.
+    :param slow: share of the Stribeck friction at this speed.
+    """
+    x = s.x
+    dp = s.bdp[1]
+    gain = plug_gain(c, x)
+    slope = dp * (plug_gain(c, x + SLOPE) - plug_gain(c, x - SLOPE)) / (2.0 * SLOPE)
+    ph = s.ph
+    ph[X1] = x + c.preload
+    ph[ONE] = 1.0
+    ph[V] = s.v
+    ph[SIGN] = 1.0 if s.v > 0.0 else -1.0
+    ph[TABLE : TABLE + N_TABLE] = 0.0
+    i, share = table_node(x)
+    ph[TABLE + i] = (1.0 - share) * dp * gain
+    ph[TABLE + i + 1] = share * dp * gain
+    ph[LAG] = gain * (s.bdp[2] - s.bdp[0]) / (s.bt[2] - s.bt[0])
+    ph[STRIBECK] = ph[SIGN] * slow
+    ph[SIGN_T] = 0.0
+    ph[X1_T] = 0.0
+    ph[PB] = s.bp[1]
+    ph[G] = MPA * gain
+    ph[POS] = -(s.theta[X1] + slope)
+    ph[POSX] = ph[POS] * x
+
+
+@jit
+def judge_block(s: Any, c: Any) -> None:
+    """
+    Classify the middle block as moving, standing or neither and build its regressor.
+
+    :param s: state record; sets moving, standing, slide, x, u, v, w and, if moving, ph.
+    :param c: settings record.
+    """
+    x = s.bx[1]
+    d1 = x - s.bx[0]
+    d2 = s.bx[2] - x
+    v = (s.bx[2] - s.bx[0]) / (s.bt[2] - s.bt[0])
+    low = min(s.bx[0], min(x, s.bx[2]))
+    high = max(s.bx[0], max(x, s.bx[2]))
+    in_range = c.range_gate < low and high < 1.0 - c.range_gate
+    step = 0.5 * c.v_min * c.block
+    fast = c.v_min <= abs(v) < c.v_max
+    s.x = x
+    s.u = s.bu[1]
+    s.v = v
+    s.moving = 0
+    s.standing = 0
+    if s.run <= 3:
+        s.slide = 0  # the first block after a gap
+    # equal signs drop reversals, the minimum drops break-away blocks
+    if in_range and fast and d1 * d2 > 0.0 and min(abs(d1), abs(d2)) >= step:
+        s.moving = 1
+        s.slide += 1
+        slow = math.exp(-((v / c.v_stribeck) ** 2))
+        s.w = 1.0 / (1.0 + c.stribeck_weight * slow)
+        regressor(s, c, slow)
+        return
+    s.slide = 0
+    if in_range and abs(v) < c.v_min and max(abs(d1), abs(d2)) < 3.0 * step:
+        s.standing = 1

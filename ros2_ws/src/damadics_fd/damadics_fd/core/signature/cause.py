@@ -1,0 +1,296 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""From evidence to a named cause: families first, "undetermined" as an honest answer (2.7-2.9)."""
+
+import math
+from typing import Any
+
+from damadics_fd.core.jit import jit, layer
+from damadics_fd.core.signature.cues import stick_evidence
+from damadics_fd.core.signature.evidence import evaluate, joint_change
+from damadics_fd.core.signature.size import physical_value
+from damadics_fd.core.signature.state import (
+    CAUSE_ELASTIC,
+    CAUSE_FRICTION_DOWN,
+    CAUSE_FRICTION_UP,
+    CAUSE_PRELOAD,
+    CAUSE_SPRING_SOFTER,
+    CAUSE_SPRING_STIFFER,
+    CAUSE_STICK_PLAY,
+    CAUSE_UNCONFIRMED,
+    FAMILY_ELASTIC,
+    FAMILY_FRICTION,
+    FAMILY_UNCONFIRMED,
+    FAMILY_UNDETERMINED,
+    FRICTION,
+    N_HYP,
+    PRELOAD,
+    SET_ALARM,
+    SET_FAST,
+    SET_SLOW,
+    SPRING,
+    STATE_MONITOR,
+)
+from damadics_fd.core.signature.sums import clear_set
+
+SECOND = 1_000_000_000  # [ns]
+FULL_EVIDENCE = 18.0  # blocks since the alarm, from which the fast set holds nothing older
+NULL_MOVING = 12.0  # blocks since the alarm
+NULL_STICK = 1.5  # stick range / reference; a healthy valve reaches 1.44
+NULL_D = 15.0  # less evidence of the moving stem than this is none
+FLIP = 10  # evaluated blocks in a row that overturn a firm family
+P_LONG = 0.99  # names a family by the long record alone
+P_STICK = 0.96
+STAGE2_EVIDENCE = 30.0
+STAGE2_STRIDE = 5
+STAGE2_SETTLED, STAGE2_STRONG = 2, 3
+SETTLED = 30.0  # [s] after the alarm: from then on the long record sizes a friction change
+STRONG = 1.0  # friction change of which the long record begins anew then
+D_VERIFY = 12.0  # largest D expected of a right model
+
+
+@jit
+def watch(s: Any, c: Any) -> None:
+    """
+    Look for a change on the three memories before any alarm (2.8).
+
+    A set is evaluated as often as its memory can change, and at every block once D is not
+    small. Where the whole misfit is below a limit, D is below it too and need not be computed.
+
+    :param s: state record; own is set if the own alarm is due.
+    :param c: settings record.
+    """
+    for m in range(SET_SLOW + 1):
+        s.due[m] += 1
+        if s.rr[m] < D_VERIFY * s.sigma * s.sigma:
+            s.D[m] = 0.0
+            s.over[m] = 0
+            continue
+        if s.D[m] < 0.5 * c.d_alarm and s.due[m] < c.memory[m] / 10.0:
+            continue
+        s.due[m] = 0
+        D = evaluate(s, c, m, c.model_error, 0.0, 0.0)
+        s.d_max[m] = max(s.d_max[m], D)
+        s.over[m] = s.over[m] + 1 if c.d_alarm < D else 0
+        if m == SET_SLOW and joint_change(s, c, m):
+            s.now_t = s.t
+        if s.over[m] >= c.n_alarm and s.state == STATE_MONITOR and own_alarm_ready(s, c):
+            s.own = 1
+            s.own_t = s.t
+
+
+@jit
+def own_alarm_ready(s: Any, c: Any) -> bool:
+    """
+    Tell whether the force model is good enough for an own alarm.
+
+    :param s: state record.
+    :param c: settings record.
+    :return: False where VERIFY found a poor plug force model or the user switched it off.
+    """
+    allowed: bool = c.own_alarm != 0 and s.verified != 0 and s.kappa <= c.kappa_max
+    return allowed
+
+
+@jit
+def decide(s: Any, c: Any) -> None:
+    """
+    Judge the alarm after a moving block, or a standing one that widened the stick range.
+
+    :param s: state record; family, cause, value, std and confidence are written.
+    :param c: settings record.
+    """
+    b_r = stick_evidence(s)
+    b_p = 6.0 if s.t < s.b_p_until and s.ne[SET_ALARM] < STAGE2_EVIDENCE else 0.0
+    m = SET_ALARM
+    D = evaluate(s, c, m, c.model_error, b_r, b_p)
+    if s.ne[SET_ALARM] >= FULL_EVIDENCE and evaluate(s, c, SET_FAST, c.model_error, b_r, b_p) > D:
+        m = SET_FAST
+        D = s.D[m]
+    if c.d_decide < D:
+        p_f = math.exp(s.logp[m][FRICTION])
+        s.run_f = s.run_f + 1 if p_f > c.p_firm else 0
+        s.run_e = s.run_e + 1 if 1.0 - p_f > c.p_firm else 0
+        if s.run_f >= (FLIP if s.family == FAMILY_ELASTIC else c.n_firm):
+            s.family = FAMILY_FRICTION
+        elif s.run_e >= (FLIP if s.family == FAMILY_FRICTION else c.n_firm):
+            s.family = FAMILY_ELASTIC
+        if s.family == FAMILY_FRICTION and p_f > 0.5:
+            if moving_unchanged(s, c, D - 2.0 * b_r):
+                name_stick(s, p_f)
+            else:
+                name_friction(s, c, m, p_f)
+        elif s.family == FAMILY_ELASTIC and p_f < 0.5:
+            name_elastic(s, c, m, 1.0 - p_f)
+    elif s.r_max > NULL_STICK * s.r_ref and s.n_alarm >= NULL_MOVING and moving_unchanged(
+        s, c, D - 2.0 * b_r
+    ):
+        s.run_e = 0
+        s.run_f += 1
+        if s.run_f >= c.n_firm:
+            s.family = FAMILY_FRICTION
+            name_stick(s, P_STICK)
+    else:
+        s.run_f = 0
+        s.run_e = 0
+        doubt(s, c)
+    second_stage(s, c)
+
+
+@jit
+def moving_unchanged(s: Any, c: Any, D: float) -> bool:
+    """
+    Tell whether the moving stem shows no change, neither of late nor on the long record.
+
+    :param s: state record.
+    :param c: settings record.
+    :param D: evidence of the moving stem on the short record.
+    :return: True if only the standing stem can explain the alarm.
+    """
+    long = s.stage2 != 0 and s.D[SET_SLOW] > c.d_decide
+    unchanged: bool = D < NULL_D and not long
+    return unchanged
+
+
+@jit
+def doubt(s: Any, c: Any) -> None:
+    """
+    Say so if the moving valve does not confirm an alarm (2.9).
+
+    :param s: state record.
+    :param c: settings record.
+    """
+    waited = (s.t - s.alarm_t) * 1e-9 >= c.unconfirmed_after
+    if waited and s.n_alarm >= NULL_MOVING and s.family == FAMILY_UNDETERMINED:
+        s.family = FAMILY_UNCONFIRMED
+        s.cause = CAUSE_UNCONFIRMED
+
+
+@jit
+def name_stick(s: Any, p: float) -> None:
+    """
+    Report friction or play that only the standing stem shows.
+
+    :param s: state record.
+    :param p: probability.
+    """
+    s.cause = CAUSE_STICK_PLAY
+    s.confidence = p
+    s.cause_value = s.r_max / s.r_ref - 1.0
+    s.cause_std = 0.0
+
+
+@jit
+def name_friction(s: Any, c: Any, m: int, p: float) -> None:
+    """
+    Report a firm friction change.
+
+    :param s: state record.
+    :param c: settings record.
+    :param m: set with the evidence.
+    :param p: posterior of friction.
+    """
+    s.confidence = p
+    if s.stage2 >= STAGE2_SETTLED and s.D[SET_SLOW] > 0.0:
+        m = SET_SLOW  # as the last stage 2 left it
+    s.cause_value, s.cause_std = physical_value(s, c, m, FRICTION)
+    s.cause = CAUSE_FRICTION_UP if s.cause_value >= 0.0 else CAUSE_FRICTION_DOWN
+
+
+@jit
+def name_elastic(s: Any, c: Any, m: int, p: float) -> None:
+    """
+    Report a firm change of the elastic family, by the spring until stage 2 knows better.
+
+    :param s: state record.
+    :param c: settings record.
+    :param m: set with the evidence.
+    :param p: posterior of the family.
+    """
+    if s.cause >= CAUSE_SPRING_STIFFER:
+        return  # named by stage 2
+    s.cause = CAUSE_ELASTIC
+    s.confidence = p
+    best = likeliest(s, m)
+    s.cause_value, s.cause_std = physical_value(s, c, m, best)
+    s.second = cause_of(best, s.cause_value)
+
+
+@jit
+def likeliest(s: Any, m: int) -> int:
+    """
+    Return the likeliest hypothesis of the elastic family.
+
+    :param s: state record.
+    :param m: set with the evidence.
+    :return: SPRING to POSITION_OFFSET.
+    """
+    best = SPRING
+    for h in range(PRELOAD, N_HYP):
+        if s.logp[m][h] > s.logp[m][best]:
+            best = h
+    return best
+
+
+@jit
+def cause_of(h: int, value: float) -> int:
+    """
+    Name a hypothesis of the elastic family.
+
+    :param h: SPRING to POSITION_OFFSET.
+    :param value: its change.
+    :return: a CAUSE constant.
+    """
+    if h == SPRING:
+        return CAUSE_SPRING_STIFFER if value >= 0.0 else CAUSE_SPRING_SOFTER
+    return CAUSE_PRELOAD + h - PRELOAD
+
+
+@layer
+def second_stage(s: Any, c: Any) -> None:
+    """
+    Name the member of the elastic family from a longer record after the alarm.
+
+    :param s: state record.
+    :param c: settings record.
+    """
+    if s.stage2 == 0:
+        if (s.t - s.alarm_t) * 1e-9 >= c.stage2_delay:
+            s.stage2 = 1
+            clear_set(s, SET_SLOW)
+        return
+    settled = (s.t - s.alarm_t) * 1e-9 >= SETTLED
+    if s.stage2 == 1 and s.family == FAMILY_FRICTION and settled:
+        s.stage2 = STAGE2_SETTLED
+        if abs(s.cause_value) > STRONG:
+            s.stage2 = STAGE2_STRONG
+            clear_set(s, SET_SLOW)  # it holds the growth of the fault; of a small one all counts
+    m = SET_SLOW
+    s.due[m] += 1
+    if s.due[m] < STAGE2_STRIDE or s.ne[m] < STAGE2_EVIDENCE:
+        return
+    s.due[m] = 0
+    D = evaluate(s, c, m, c.model_error_stage2, 0.0, 0.0)
+    if joint_change(s, c, m):
+        s.now_t = s.t
+    if c.d_decide >= D:
+        return
+    if s.family in (FAMILY_UNDETERMINED, FAMILY_UNCONFIRMED):
+        # too small a change for the shorter sets
+        p_f = math.exp(s.logp[m][FRICTION])
+        if p_f > P_LONG:
+            s.family = FAMILY_FRICTION
+            name_friction(s, c, m, p_f)
+        elif 1.0 - p_f > P_LONG:
+            s.family = FAMILY_ELASTIC
+    if s.family != FAMILY_ELASTIC:
+        return
+    best = likeliest(s, m)
+    total = 0.0
+    for h in range(SPRING, N_HYP):
+        total += math.exp(s.logp[m][h])
+    p = math.exp(s.logp[m][best]) / max(total, 1e-300)
+    s.cause_value, s.cause_std = physical_value(s, c, m, best)
+    s.second = cause_of(best, s.cause_value)
+    s.confidence = p
+    s.cause = s.second if p > c.p_firm else CAUSE_ELASTIC

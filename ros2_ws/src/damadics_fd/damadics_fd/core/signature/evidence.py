@@ -1,0 +1,269 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Evidence for each hypothesis from exponentially weighted sums over moving blocks.
+
+Every hypothesis adds one or two columns to the reference model. The error of the reference
+is common to all of them, so it is eliminated once (Schur complement) and each hypothesis is a
+division. The result equals the restricted least squares of the specification term by term.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from damadics_fd.core.jit import jit
+from damadics_fd.core.linalg import cholesky, forward, inverse
+from damadics_fd.core.signature.size import SMALL_FRICTION
+from damadics_fd.core.signature.state import (
+    FRICTION,
+    N_COL,
+    N_HYP,
+    N_REF,
+    ONE,
+    PRELOAD,
+    SET_ALARM,
+    SIGN,
+    SIGN_T,
+    SPRING,
+    TABLE,
+    X1,
+    X1_T,
+    V,
+)
+from damadics_fd.core.signature.sums import growth_time
+
+# column of hypotheses 3 to 7: 1, position gain, chamber pressure, P1 - P2, position offset
+COLUMN = np.array([-1, -1, -1, ONE, N_REF + 3, N_REF, N_REF + 1, N_REF + 2])
+# columns of the hypotheses with several
+FRICTION_COLUMNS = np.array([SIGN, V, SIGN_T])
+SPRING_COLUMNS = np.array([X1, X1_T])
+JOINT_COLUMNS = np.array([X1, ONE, SIGN, V])
+MIN_EVIDENCE = 4.0  # blocks
+CONFLICT = 3.0  # log odds of the moving stem against friction that outweigh the stick range
+SMALL = 2e-3  # [1] tolerance of the exclusions
+
+
+@jit
+def eliminate_reference(s: Any, m: int, iv: float) -> float:
+    """
+    Eliminate the error of the reference from one set.
+
+    :param s: state record; Gm and gv receive information matrix and vector of the columns
+        that remain (unit: 1 / variance of the change).
+    :param m: index of the set.
+    :param iv: 1 / variance of a block.
+    :return: J_0, the misfit without any change; negative if the sums are not usable.
+    """
+    S = s.S[m]
+    q = s.q[m]
+    L, Y, y0 = s.L[0], s.Y[0], s.y0
+    n = len(y0)
+    for i in range(n):
+        for j in range(i + 1):
+            L[i, j] = iv * S[i, j] + s.J0[i, j]
+        for j in range(N_COL):
+            Y[i, j] = iv * S[i, j]
+        y0[i] = iv * q[i]
+    if not cholesky(L, L, n):
+        return -1.0
+    forward(L, Y, n, len(q))
+    for i in range(n):
+        a = y0[i]
+        for k in range(i):
+            a -= L[i, k] * y0[k]
+        y0[i] = a / L[i, i]
+    J_0: float = iv * s.rr[m]
+    for i in range(N_REF):
+        J_0 -= y0[i] * y0[i]
+    for i in range(N_COL):
+        if TABLE <= i < N_REF:
+            continue
+        g = iv * q[i]
+        for k in range(N_REF):
+            g -= Y[k, i] * y0[k]
+        s.gv[i] = g
+        a = iv * S[i, i]
+        for k in range(N_REF):
+            a -= Y[k, i] * Y[k, i]
+        s.Gm[0, i, i] = max(a, 0.0)
+    return max(J_0, 0.0)
+
+
+@jit
+def cross_information(s: Any, m: int, iv: float, i: int, j: int) -> float:
+    """
+    Return one off-diagonal entry of the information matrix after `eliminate_reference`.
+
+    :param s: state record.
+    :param m: index of the set.
+    :param iv: 1 / variance of a block.
+    :param i: column.
+    :param j: column.
+    :return: the entry.
+    """
+    a: float = iv * s.S[m][i, j]
+    for k in range(N_REF):
+        a -= s.Y[0, k, i] * s.Y[0, k, j]
+    return a
+
+
+@jit
+def solve_group(
+    s: Any, m: int, iv: float, columns: NDArray[np.int64], count: int,
+    prior: tuple[float, float, float, float],
+) -> float:
+    """
+    Fit the columns of one hypothesis.
+
+    :param s: state record; the changes d and their covariance H are written.
+    :param m: index of the set.
+    :param iv: 1 / variance of a block.
+    :param columns: of the regressor; the first `count` of them are used.
+    :param count: number of columns.
+    :param prior: standard deviation of each change.
+    :return: misfit that the hypothesis explains; negative if the sums are not usable.
+    """
+    H, d = s.H[0], s.d
+    for i in range(count):
+        H[i, i] = s.Gm[0, columns[i], columns[i]] + 1.0 / (prior[i] * prior[i])
+        for j in range(i):
+            H[i, j] = cross_information(s, m, iv, columns[i], columns[j])
+        d[i] = 0.0
+    if not inverse(H, s.W[0], count):
+        return -1.0
+    explained = 0.0
+    for i in range(count):
+        for j in range(count):
+            d[i] += H[i, j] * s.gv[columns[j]]
+        explained += d[i] * s.gv[columns[i]]
+    return max(explained, 0.0)
+
+
+@jit
+def combine(s: Any, count: int, a: float, b: float, scale: float) -> tuple[float, float]:
+    """
+    Return the change d0 + a d1 + b d2 of the last group in units of `scale`.
+
+    :param s: state record after `solve_group`.
+    :param count: number of columns.
+    :param a: weight of the second column.
+    :param b: weight of the third column.
+    :param scale: unit.
+    :return: value and standard deviation.
+    """
+    weight = (1.0, a, b)
+    value, variance = 0.0, 0.0
+    for i in range(count):
+        value += weight[i] * s.d[i]
+        for j in range(count):
+            variance += weight[i] * weight[j] * s.H[0, i, j]
+    return value / scale, math.sqrt(max(variance, 0.0)) / scale
+
+
+@jit
+def evaluate(s: Any, c: Any, m: int, eps: float, b_r: float, b_p: float) -> float:
+    """
+    Weigh the hypotheses on one set (2.5).
+
+    :param s: state record; logp, value, sd and D of the set are written.
+    :param c: settings record.
+    :param m: index of the set.
+    :param eps: model error as a share of the signal.
+    :param b_r: log evidence of the stick range for friction.
+    :param b_p: log evidence of passivity for the elastic family.
+    :return: D.
+    """
+    ne = s.ne[m]
+    s.D[m] = 0.0
+    if ne < 1.0 or (ne < MIN_EVIDENCE and b_r <= 0.0 and b_p <= 0.0):
+        return 0.0
+    sigma2 = s.sigma * s.sigma
+    iv = 1.0 / (sigma2 * max(1.0, eps * eps * s.rr[m] / (sigma2 * ne)))
+    J_0 = eliminate_reference(s, m, iv)
+    if J_0 < 0.0:
+        return 0.0
+    logp, value, std = s.logp[m], s.value[m], s.sd[m]
+    logp[0] = J_0  # first the misfits J_h
+    now = growth_time(s)
+    # friction: dry and viscous part together
+    count = 3 if m == SET_ALARM else 2
+    explained = solve_group(s, m, iv, FRICTION_COLUMNS, count,
+                            (c.change_std[1], c.change_std[0], c.growth_std[0], 1.0))
+    v_mean = s.vb[m] / ne
+    scale = max(s.theta[SIGN] + s.theta[V] * v_mean, SMALL_FRICTION)
+    logp[FRICTION] = J_0 - explained
+    value[FRICTION], std[FRICTION] = combine(s, count, v_mean, now, scale)
+    if value[FRICTION] < -1.3 - SMALL / scale:
+        logp[FRICTION] = J_0  # friction cannot become negative
+    # spring
+    explained = solve_group(s, m, iv, SPRING_COLUMNS, count - 1,
+                            (c.change_std[2], c.growth_std[1], 1.0, 1.0))
+    logp[SPRING] = J_0 - explained
+    value[SPRING], std[SPRING] = combine(s, count - 1, now, 0.0, s.theta[X1])
+    if value[SPRING] < -1.05:
+        logp[SPRING] = J_0
+    for h in range(PRELOAD, N_HYP):
+        k = COLUMN[h]
+        info = s.Gm[0, k, k] + 1.0 / (c.change_std[h] * c.change_std[h])
+        value[h] = s.gv[k] / info
+        std[h] = 1.0 / math.sqrt(info)
+        logp[h] = J_0 - s.gv[k] * value[h]
+    J_min = logp[0]
+    for h in range(1, N_HYP):
+        J_min = min(J_min, logp[h])
+    sc = max(1.0, J_min / max(ne - 2.0, 1.0))
+    # misfits to log posteriors, normalised over h >= 1
+    for h in range(1, N_HYP):
+        logp[h] = math.log(c.prior[h]) - logp[h] / (2.0 * sc)
+    logp[FRICTION] -= 0.5 * math.log(ne)
+    elastic = logp[SPRING]
+    for h in range(PRELOAD, N_HYP):
+        elastic = max(elastic, logp[h])
+    if elastic - logp[FRICTION] > CONFLICT:
+        b_r = 0.0  # a growing spring change widens the stick range too
+    D: float = (J_0 - J_min) / sc + 2.0 * b_r
+    s.D[m] = D
+    logp[FRICTION] += b_r
+    for h in range(SPRING, N_HYP):
+        logp[h] += b_p
+    top = max(logp[FRICTION], elastic + b_p)
+    total = 0.0
+    for h in range(1, N_HYP):
+        total += math.exp(logp[h] - top)
+    for h in range(1, N_HYP):
+        logp[h] -= top + math.log(total)
+    return D
+
+
+@jit
+def joint_change(s: Any, c: Any, m: int) -> bool:
+    """
+    Estimate spring, preload and friction together, for the trends.
+
+    :param s: state record; now and now_std are written: dK/K0, preload in N, dF.
+    :param c: settings record.
+    :param m: index of the set.
+    :return: False if the set is not usable yet.
+    """
+    ne = s.ne[m]
+    if ne < 60.0:
+        return False
+    iv = 1.0 / (s.sigma * s.sigma)
+    if eliminate_reference(s, m, iv) < 0.0:
+        return False
+    prior = (c.change_std[2], c.change_std[3], c.change_std[1], c.change_std[0])
+    if solve_group(s, m, iv, JOINT_COLUMNS, len(s.d), prior) < 0.0:
+        return False
+    H, d = s.H[0], s.d
+    v = s.vb[m] / ne
+    scale = max(s.theta[SIGN] + s.theta[V] * v, SMALL_FRICTION)
+    s.now[0] = d[0] / s.theta[X1]
+    s.now[1] = d[1] * c.force_scale
+    s.now[2] = (d[2] + d[3] * v) / scale
+    s.now_std[0] = math.sqrt(H[0, 0]) / s.theta[X1]
+    s.now_std[1] = math.sqrt(H[1, 1]) * c.force_scale
+    s.now_std[2] = math.sqrt(H[2, 2] + 2.0 * v * H[2, 3] + v * v * H[3, 3]) / scale
+    return True

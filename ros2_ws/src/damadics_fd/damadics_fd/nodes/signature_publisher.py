@@ -1,0 +1,192 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Publish the valve signature and keep its trends."""
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from damadics_msgs.msg import Signature as SignatureMessage
+from rclpy.node import Node
+from std_msgs.msg import Header
+
+from damadics_fd.causes import CauseTable, CauseTableError, load_causes
+from damadics_fd.core.settings import Settings
+from damadics_fd.core.signature.cause import own_alarm_ready
+from damadics_fd.core.signature.signature import Signature
+from damadics_fd.ros import qos
+from damadics_fd.ros.spin import StartError
+from damadics_fd.store.alarms import another_run
+from damadics_fd.store.references import (
+    NoReferenceError,
+    Reference,
+    load_reference,
+    save_reference,
+)
+from damadics_fd.store.trends import QUANTITIES, Outlook, TrendFile, series_name
+
+PERIOD = 1_000_000_000  # ns of measurement time between two messages without news
+
+
+def read_causes(path: str) -> CauseTable:
+    """
+    Read the table of causes that a node is given.
+
+    :param path: file of the user; empty for the table of the package.
+    :return: the table.
+    :raises StartError: naming everything that is wrong in it.
+    """
+    try:
+        return load_causes(Path(path) if path else None)
+    except (CauseTableError, OSError) as error:
+        raise StartError(f'causes_file: {error}') from error
+
+
+class SignaturePublisher:
+    """
+    Publisher of `signature`, about once a second of measurement time and on every change.
+
+    :param node: the detector.
+    :param signature: of its core.
+    :param actuator: tag; also names the files.
+    :param settings: that the signature was learned with.
+    :param folder: keeps the learned signature and its trends over a restart; None for none.
+    :param limits: of the trends, per quantity.
+    """
+
+    def __init__(self, node: Node, signature: Signature, actuator: str, settings: Settings,
+                 folder: Path | None, limits: Mapping[str, Sequence[float]]) -> None:
+        self._node = node
+        self._signature = signature
+        self._actuator = actuator
+        self._settings = settings
+        self._folder = folder
+        self._limits = limits
+        self._trend: TrendFile | None = None
+        self._outlook: list[Outlook] = []
+        self._restored: int | None = None  # stamp of the reference that was taken up
+        self._saved: dict[str, Any] = {}
+        self._last: tuple[int, ...] = ()
+        self._next = 0
+        self._publisher = node.create_publisher(SignatureMessage, 'signature', qos.FLAG)
+
+    def restore(self) -> None:
+        """Take up the signature of before, where there is a good one."""
+        if self._folder is None or self._settings.mode != 'monitor':
+            return
+        try:
+            kept = load_reference(self._path(self._folder), self._actuator, self._settings)
+            self._signature.load(kept.signature)
+            self._saved = kept.signature
+            self._restored = kept.last_stamp
+            self._node.get_logger().info(f'signature of before taken up from {self._folder}')
+        except NoReferenceError:
+            self._node.get_logger().info(f'the signature is learned, and kept in {self._folder}')
+        except ValueError as problem:
+            self._node.get_logger().warning(f'the signature is learned anew: {problem}')
+
+    def begin(self, stamp: int) -> None:
+        """
+        Learn anew where the signature of before belongs to another simulated run.
+
+        :param stamp: of a measurement that is about to be judged [ns].
+        """
+        if self._restored is None:
+            return
+        if another_run(self._restored, stamp):
+            self._node.get_logger().info('time begins anew: the signature is learned anew')
+            self._signature.relearn()
+            self._saved = {}
+        self._restored = None
+
+    @property
+    def values(self) -> dict[str, str]:
+        """Cause and outlook of each trend, for the diagnostics."""
+        view = self._signature.view()
+        return {'Cause': view.cause.replace('_', ' '),
+                **{f'Trend of {o.quantity}': o.sentence() for o in self._outlook}}
+
+    def update(self, header: Header, stamp: int) -> None:
+        """
+        Publish where there is news or a second is over.
+
+        :param header: of the measurement.
+        :param stamp: the same stamp [ns].
+        """
+        s = self._signature.state[0]
+        present = (int(s.state), int(s.family), int(s.cause))
+        if present == self._last and self._next - PERIOD <= stamp < self._next:
+            return
+        self._last, self._next = present, stamp + PERIOD
+        if self._folder and s.verified:
+            try:
+                self._keep(self._folder, stamp)
+            except OSError as problem:
+                self._node.get_logger().error(
+                    f'signature and trend are not kept: {problem}; check folder and free space',
+                    throttle_duration_sec=60.0)
+        self._outlook = self._trend.outlook(self._limits, stamp * 1e-9) if self._trend else []
+        message = signature_message(self._signature, header)
+        write_outlook(self._outlook, message)
+        self._publisher.publish(message)
+
+    def _keep(self, folder: Path, stamp: int) -> None:
+        s = self._signature.state[0]
+        known = self._saved.get('theta'), self._saved.get('unit_weight')
+        if self._trend is None or (s.theta.tolist(), float(s.unit_weight)) != known:
+            saved = self._signature.save()
+            if saved != self._saved:
+                save_reference(self._path(folder), Reference(
+                    self._actuator, {}, self._settings.to_dict(), saved, source='live',
+                    last_stamp=stamp))
+                self._saved = saved
+            self._trend = TrendFile(folder, self._actuator, series_name(saved))
+        if s.now_t:
+            self._trend.add(stamp, s.now.tolist(), s.now_std.tolist())
+
+    def _path(self, folder: Path) -> Path:
+        return folder / f'{self._actuator}.signature'
+
+
+def signature_message(signature: Signature, header: Header) -> SignatureMessage:
+    """
+    Return the state of the signature as a message.
+
+    :param signature: of the core.
+    :param header: of the measurement.
+    :return: the message.
+    """
+    s, view = signature.state[0], signature.view()
+    message = SignatureMessage(
+        header=header, state=view.state, family=view.family, cause=int(s.cause),
+        second=int(s.second) if s.cause == SignatureMessage.CAUSE_ELASTIC else 0,
+        own_alarm_ready=bool(own_alarm_ready(s, signature.record[0])),
+        progress=signature.progress, value=view.value, std=view.std, confidence=view.confidence,
+        d=float(s.D.max()), kappa=float(s.kappa), sigma=float(s.sigma),
+        stick_ratio=float(s.r_max / s.r_ref) if s.r_ref > 0.0 else 0.0,
+        theta=s.theta[:4].tolist(), change=s.now.tolist(), change_std=s.now_std.tolist(),
+        fill=float(s.air_rate[0]), vent=float(s.air_rate[1]),
+    )
+    if s.own:
+        message.source = SignatureMessage.SOURCE_OWN
+    elif s.state == SignatureMessage.STATE_ALARM:
+        message.source = SignatureMessage.SOURCE_APPROXIMATOR
+    return message
+
+
+def write_outlook(outlook: Sequence[Outlook], message: SignatureMessage) -> None:
+    """
+    Write the time that each trend takes to its limit.
+
+    :param outlook: of the trends that have enough points.
+    :param message: written.
+    """
+    names = ('trend', 'limit', 'time_to_limit', 'time_to_limit_earliest', 'time_to_limit_latest')
+    columns = {name: [math.nan] * len(QUANTITIES) for name in names}
+    for o in outlook:
+        row = (o.trend.slope * 86400.0, o.limit, o.time.expected, o.time.earliest, o.time.latest)
+        for name, value in zip(names, row, strict=True):
+            columns[name][QUANTITIES.index(o.quantity)] = value
+    for name, values in columns.items():
+        setattr(message, name, values)

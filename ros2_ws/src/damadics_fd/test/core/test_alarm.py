@@ -1,0 +1,315 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Decision and alarm life: the AM rows of the reliability cases."""
+
+import json
+import math
+
+import hypothesis.strategies as st
+import pytest
+from damadics_fd.core.approximator.estimator import Estimate
+from damadics_fd.core.decision import alarm
+from damadics_fd.core.decision.alarm import (
+    ACKNOWLEDGED,
+    CHANGED,
+    CLEARED,
+    NEAR_MISS,
+    RAISED,
+    RESET,
+    SHELVED,
+    STATE_ALARM,
+    STATE_HEALTHY,
+    STATE_LATCHED,
+    STATE_LEARNING,
+    STATE_NOT_MONITORING,
+    STATE_SHELVED,
+    UNSHELVED,
+)
+from damadics_fd.core.decision.detector import Detector
+from damadics_fd.core.modes import PHASE_HOLD, PHASE_LEARN_PHI, PHASE_MONITOR
+from damadics_fd.core.settings import Settings
+from hypothesis import settings as profile
+from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
+
+TICK = 5_000_000
+
+
+class Valve:
+    """A detector fed with residuals as multiples of the threshold."""
+
+    def __init__(self, **changes):
+        self.settings = Settings.for_mode('monitor', **changes)
+        self.detector = Detector(self.settings)
+        self.stamp = 0
+        self.events = []
+
+    def feed(self, ratio, seconds=0.0, phase=PHASE_MONITOR, x=0.5):
+        for _ in range(max(1, round(seconds * 1e9 / TICK))):
+            self.stamp += TICK
+            xi2 = ratio * self.settings.rho_min
+            decision = self.detector.update(Estimate(
+                self.stamp, 0.0, x + 0.25, 0.0, 0.0, xi2, 0.0, 750.0, 30446.0, 30446.0, x, 0.5,
+                2e5, 9e5, 1.0, phase))
+            self.events += decision.events
+        return decision
+
+    def names(self):
+        return [event.name for event in self.events]
+
+
+def test_a_single_spike_is_a_near_miss():  # IN-3, AM-2
+    valve = Valve()
+    valve.feed(0.1, 1.0)
+    valve.feed(1e9)
+    decision = valve.feed(0.1, 1.0)
+    assert not decision.fault
+    assert valve.names() == ['near_miss']
+    assert valve.detector.statistics == {'occurrences': 0, 'near_misses': 1, 'chatter': 0}
+
+
+def test_m_of_n_counts_samples_that_are_not_in_a_row():
+    valve = Valve(decide_m=3, decide_n=5)
+    for ratio in (1.2, 0.1, 1.2, 0.1):
+        assert not valve.feed(ratio).fault
+    assert valve.feed(1.2).fault
+    assert valve.names() == ['raised']
+    assert valve.events[0].onset == TICK
+
+
+def test_decision_shorter_than_the_on_delay_is_a_near_miss():  # AM-2
+    valve = Valve(on_delay=0.5)
+    valve.feed(1.5, 0.4)
+    assert not valve.feed(0.1, 1.0).fault
+    assert valve.names() == ['near_miss']
+    decision = valve.feed(1.5, 0.6)
+    assert decision.fault
+    assert decision.since - decision.onset == pytest.approx(0.5e9, abs=2 * TICK)
+
+
+def test_chattering_condition_is_one_alarm():  # AM-1
+    valve = Valve(latch=False)
+    for _ in range(30):
+        valve.feed(1.5, 0.5)
+        valve.feed(0.1, 0.5)
+    assert valve.names() == ['raised']
+    without = Valve(latch=False, off_delay=0.0)
+    for _ in range(3):
+        without.feed(1.5, 0.5)
+        without.feed(0.1, 0.5)
+    assert without.names() == ['raised', 'cleared'] * 3
+    assert without.detector.statistics['chatter'] == 1
+
+
+def test_returned_alarm_stays_until_a_person_has_seen_it():  # AM-3, AM-4, AM-5
+    valve = Valve()
+    assert valve.feed(1.2, 1.0).state == STATE_ALARM
+    refused = valve.detector.reset_alarm()
+    assert not refused.done
+    assert 'still active' in refused.text
+    decision = valve.feed(0.1, 10.0)
+    assert (decision.fault, decision.state, decision.acknowledged) == (True, STATE_LATCHED, False)
+    assert valve.detector.acknowledge().done
+    assert valve.detector.acknowledge().events == ()  # AM-8: twice is no error
+    assert not valve.detector.acknowledge(7).done
+    assert valve.detector.reset_alarm().done
+    assert valve.detector.decision.state == STATE_HEALTHY
+    assert not valve.detector.reset_alarm().done
+    assert not valve.feed(0.1).fault
+
+
+def test_acknowledged_alarm_is_announced_again_only_as_a_new_occurrence():  # AM-4, AL-7
+    valve = Valve()
+    valve.feed(1.2, 1.0)
+    first = valve.detector.acknowledge()
+    assert [event.transition for event in first.events] == [ACKNOWLEDGED]
+    assert valve.feed(1.3, 1.0).acknowledged
+    valve.feed(0.1, 6.0)
+    decision = valve.feed(1.2, 1.0)
+    assert decision.occurrence == 2
+    assert not decision.acknowledged
+    assert valve.names() == ['raised', 'cleared', 'raised']
+    assert valve.events[2].onset == valve.stamp - 200 * TICK + TICK
+
+
+def test_levels_rise_with_the_ratio():
+    valve = Valve()
+    assert valve.feed(1.1, 0.1).level == alarm.MAINTENANCE_REQUIRED
+    assert valve.feed(1.6, 0.1).level == alarm.OUT_OF_SPECIFICATION
+    assert valve.feed(2.6, 0.1).level == alarm.FAILURE
+    assert valve.feed(1.1, 0.1).level == alarm.FAILURE  # the worst of this fault
+    assert valve.names() == ['raised', 'changed', 'changed']
+    assert valve.events[-1].ratio == pytest.approx(2.6)
+    assert 'failure' in valve.events[-1].text
+
+
+def test_shelf_masks_records_and_ends_by_itself():  # AM-6
+    valve = Valve()
+    assert [e.transition for e in valve.detector.shelve(10.0).events] == [SHELVED]
+    decision = valve.feed(2.0, 5.0)
+    assert (decision.fault, decision.state) == (False, STATE_SHELVED)
+    assert decision.level == alarm.FUNCTION_CHECK
+    assert decision.occurrence == 1
+    decision = valve.feed(2.0, 6.0)
+    assert (decision.fault, decision.state) == (True, STATE_ALARM)
+    assert valve.names() == ['raised', 'unshelved']
+    assert not valve.detector.shelve(math.nan).done
+    assert not valve.detector.shelve(-1.0).done
+    assert not valve.detector.unshelve().done
+
+
+def test_alarm_survives_a_restart():  # AM-7
+    valve = Valve()
+    valve.feed(1.7, 1.0)
+    valve.feed(0.1, 6.0)
+    saved = json.loads(json.dumps(valve.detector.save()))
+    again = Valve()
+    again.detector.load(saved)
+    again.stamp = valve.stamp
+    decision = again.detector.decision
+    assert (decision.fault, decision.state, decision.acknowledged) == (True, STATE_LATCHED, False)
+    assert again.feed(0.1) == valve.feed(0.1)
+
+
+@pytest.mark.parametrize('damage', [
+    lambda s: s.pop('active'), lambda s: s.update(active_since=1), lambda s: s.update(peak='x'),
+    lambda s: s.update(peak=math.inf), lambda s: s.update(recent=[1, 2]),
+    lambda s: s.update(occurrence=2**70),
+])
+def test_damaged_alarm_state_is_refused_whole(damage):
+    valve = Valve()
+    valve.feed(1.7, 1.0)
+    saved = valve.detector.save()
+    damage(saved)
+    before = valve.detector.save()
+    with pytest.raises(ValueError):
+        valve.detector.load(saved)
+    assert valve.detector.save() == before
+
+
+def test_alarm_stays_while_the_detector_does_not_monitor():
+    valve = Valve()
+    assert valve.feed(0.1, phase=PHASE_LEARN_PHI).state == STATE_LEARNING
+    assert valve.feed(9.9, 1.0, phase=PHASE_LEARN_PHI).state == STATE_LEARNING
+    assert valve.feed(9.9, 1.0, phase=PHASE_HOLD).state == STATE_NOT_MONITORING
+    valve.feed(1.5, 1.0)
+    decision = valve.feed(0.1, 60.0, phase=PHASE_HOLD)
+    assert (decision.fault, decision.state) == (True, STATE_ALARM)
+    assert valve.feed(0.1, 6.0).state == STATE_LATCHED
+
+
+def test_clock_set_back_keeps_the_alarm():  # TI-5
+    valve = Valve()
+    valve.feed(1.5, 20.0)
+    valve.detector.shelve(3600.0)
+    valve.stamp = 0
+    decision = valve.feed(0.1, 4.0)
+    assert decision.state == STATE_SHELVED
+    valve.detector.unshelve()
+    assert valve.feed(0.1, 0.1).state == STATE_ALARM  # the off delay started afresh
+    assert valve.feed(0.1, 2.0).state == STATE_LATCHED
+
+
+def test_gates_at_the_stops():  # AL-4
+    valve = Valve()
+    assert not valve.feed(5.0, 0.1, x=0.005).fault  # pushed open by the stop
+    assert not valve.feed(5.0, 0.1, x=0.975).fault
+    assert not valve.feed(-5.0, 0.1, x=0.975).fault
+    assert valve.feed(-5.0, 0.1, x=0.005).fault
+
+
+def test_frozen_position_is_named():  # IN-4
+    valve = Valve()
+    valve.feed(0.1, 20.0)
+    valve.feed(3.0, 0.1)
+    assert 'position frozen for 20 s: stem or position sensor' in valve.events[0].text
+
+
+class AlarmMachine(RuleBasedStateMachine):
+    """AM-9: no sequence of samples and requests breaks the alarm."""
+
+    def __init__(self):
+        super().__init__()
+        self.valve = Valve(on_delay=0.01, off_delay=0.1)
+        self.valve.feed(0.1)
+        self.raised = self.cleared = 0
+        self.active_before = False
+        self.reset_allowed = False
+
+    def note(self, events):
+        for event in events:
+            if event.transition == RAISED:
+                assert not self.active_before
+                self.raised += 1
+                self.active_before = True
+            elif event.transition == CLEARED:
+                assert self.active_before
+                self.cleared += 1
+                self.active_before = False
+            elif event.transition == RESET:
+                assert not self.active_before  # never reset while active
+            assert event.transition in (RAISED, CLEARED, ACKNOWLEDGED, RESET, SHELVED, UNSHELVED,
+                                        NEAR_MISS, CHANGED)
+
+    @rule(ratio=st.sampled_from([0.0, 0.9, 1.1, 2.0, 9.0]), n=st.integers(1, 40),
+          phase=st.sampled_from([PHASE_MONITOR] * 4 + [PHASE_HOLD, PHASE_LEARN_PHI]))
+    def sample(self, ratio, n, phase):
+        for _ in range(n):
+            was = self.valve.detector.decision
+            decision = self.valve.feed(ratio, phase=phase)
+            self.note(decision.events)
+            if was.fault and not decision.fault:
+                raise AssertionError('an alarm went without reset')
+            if any(e.transition == CLEARED for e in decision.events):
+                assert ratio < 1.0, 'cleared while over the threshold'
+
+    @rule()
+    def acknowledge(self):
+        outcome = self.valve.detector.acknowledge()
+        assert outcome.done == (self.valve.detector.state['active'][0]
+                                or self.valve.detector.state['latched'][0])
+        self.note(outcome.events)
+
+    @rule()
+    def reset(self):
+        active = self.active_before
+        outcome = self.valve.detector.reset_alarm()
+        assert not (active and outcome.done)
+        self.note(outcome.events)
+        if outcome.done and self.valve.detector.state['shelved_until'][0] == 0:
+            assert self.valve.detector.decision.state != STATE_LATCHED
+
+    @rule(seconds=st.sampled_from([0.05, 1.0, -1.0]))
+    def shelve(self, seconds):
+        assert self.valve.detector.shelve(seconds).done == (seconds > 0)
+
+    @rule()
+    def unshelve(self):
+        self.valve.detector.unshelve()
+
+    @rule()
+    def restart(self):
+        saved = json.loads(json.dumps(self.valve.detector.save()))
+        self.valve.detector = Detector(self.valve.settings)
+        self.valve.detector.load(saved)
+        assert self.valve.detector.save() == saved
+
+    @rule(back=st.integers(1, 10**9))
+    def set_clock_back(self, back):
+        self.valve.stamp = max(self.valve.stamp - back, 0)
+
+    @invariant()
+    def consistent(self):
+        state = self.valve.detector.state[0]
+        decision = self.valve.detector.decision
+        assert bool(state.active) == self.active_before
+        assert int(state.occurrence) == self.raised == self.cleared + self.active_before
+        shelved = state.shelved_until > 0
+        assert decision.fault == ((bool(state.active) or bool(state.latched)) and not shelved)
+        assert not state.active or state.latched
+        assert decision.level in (0, 1, 2, 3, 4)
+        if decision.fault:
+            assert decision.level in (1, 2, 4)
+
+
+AlarmMachine.TestCase.settings = profile(max_examples=200, stateful_step_count=30, deadline=None)
+TestAlarmMachine = AlarmMachine.TestCase
