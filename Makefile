@@ -29,7 +29,7 @@ report: $(BUILT) ## the benchmark's 44 scenarios x all detectors: docs/results/ 
 		&& ros2 run damadics_evaluate evaluate report results/campaign --to docs/results
 
 campaign-monitor: $(BUILT) ## false alarms, delays, masking, sample rates of mode monitor (an hour)
-	@$(ENV) && python -m damadics_evaluate.monitor_campaign $(ARGS)
+	@$(ENV) && python -m damadics_evaluate.campaigns.monitor $(ARGS)
 
 build: $(BUILT) ## set up .venv and build the ROS 2 workspace
 
@@ -41,7 +41,7 @@ $(BUILT): $(SOURCES) tools/build.sh tools/setup_env.py $(wildcard tools/requirem
 	@tools/build.sh
 
 lint: $(BUILT) ## check style and types
-	@$(ENV) && ruff check . && mypy ros2_ws/src/damadics_fd/damadics_fd/core
+	@$(ENV) && ruff check . && ruff format --check . && mypy ros2_ws/src/damadics_fd/damadics_fd/core
 
 clean: ## remove everything that was built
 	rm -rf .venv ros2_ws/build ros2_ws/install ros2_ws/log

@@ -57,10 +57,14 @@ def write(name: str, columns: dict[str, np.ndarray]) -> Path:
     with BagWriter(path, level=19, chunk_size=1 << 22, message_index=False) as bag:
         bag.add_topic('/measurement', 'damadics_msgs/msg/Measurement', [qos(depth=1000)])
         bag.add_topic('/fault_state', 'damadics_msgs/msg/FaultState', [qos(depth=1000)])
-        bag.write_columns(columns['stamp'], {
-            '/measurement': {signal: columns[signal] for signal in FULL_SCALE},
-            '/fault_state': {signal: columns[signal] for signal in ('strength', 'fault')},
-        }, 'LC74_20')
+        bag.write_columns(
+            columns['stamp'],
+            {
+                '/measurement': {signal: columns[signal] for signal in FULL_SCALE},
+                '/fault_state': {signal: columns[signal] for signal in ('strength', 'fault')},
+            },
+            'LC74_20',
+        )
     return path
 
 
@@ -70,7 +74,8 @@ def judged(name: str) -> dict[str, object]:
     columns = read_columns(HERE / f'{name}.mcap')
     result = run(columns, Settings.for_mode(mode))
     return {
-        'mode': mode, 'samples': len(columns['stamp']),
+        'mode': mode,
+        'samples': len(columns['stamp']),
         'detections_ns': [event.stamp for event in result.detections],
     }
 

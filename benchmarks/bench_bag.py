@@ -81,15 +81,21 @@ def reading(folder: Path) -> None:
     measured = {}
     for number in sorted({1, threads}):
         loading.THREADS = number
-        measured |= {f'{name}, threads: {number}': spent(reader, 15) / ROWS
-                     for name, reader in readers.items()}
+        measured |= {
+            f'{name}, threads: {number}': spent(reader, 15) / ROWS
+            for name, reader in readers.items()
+        }
     peers = {'rosbags': rosbags, 'mcap + mcap-ros2-support': mcap_ros2}
     slow = {name: spent(peer, 3) / SLOW_ROWS for name, peer in peers.items()}
-    print(f'{"reading /measurement":28}{"CPU us/message":>16}{"wall":>8}' + ''.join(
-        f'{name.split(" ")[0] + ": CPU x":>18}{"wall x":>8}' for name in slow))
+    print(
+        f'{"reading /measurement":28}{"CPU us/message":>16}{"wall":>8}'
+        + ''.join(f'{name.split(" ")[0] + ": CPU x":>18}{"wall x":>8}' for name in slow)
+    )
     for name, (cpu, wall) in (measured | slow).items():
-        print(f'{name:28}{cpu * 1e6:16.4f}{wall * 1e6:8.4f}' + ''.join(
-            f'{peer[0] / cpu:18.1f}{peer[1] / wall:8.1f}' for peer in slow.values()))
+        print(
+            f'{name:28}{cpu * 1e6:16.4f}{wall * 1e6:8.4f}'
+            + ''.join(f'{peer[0] / cpu:18.1f}{peer[1] / wall:8.1f}' for peer in slow.values())
+        )
     print(f'bag: {large.stat().st_size / ROWS:.1f} B/message')
 
 
@@ -99,8 +105,10 @@ def replaying(folder: Path) -> None:
     from damadics_fd.commands.replay.bags import Plan, replay, warm_up
 
     source = Recording(folder / 'large.mcap')
-    print(f'\n{"whole replay":20}{"M samples/s and core":>22}{"day at 200 Hz":>16}'
-          f'{"M samples/s, wall":>20}')
+    print(
+        f'\n{"whole replay":20}{"M samples/s and core":>22}{"day at 200 Hz":>16}'
+        f'{"M samples/s, wall":>20}'
+    )
     for mode in ('paper', 'monitor'):
         warm_up([Plan(mode)])
         cpu, wall = ROWS / spent(lambda mode=mode: replay(source, Plan(mode)), 10)
@@ -124,8 +132,12 @@ def memory(folder: Path) -> None:
             'main([sys.argv[1], "--mode", "monitor", "--figures", sys.argv[2]]);'
             'print("peak", resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3)'
         )
-        out = subprocess.run([sys.executable, '-c', code, str(path), str(folder / 'figures')],
-                             capture_output=True, text=True, check=True).stdout
+        out = subprocess.run(
+            [sys.executable, '-c', code, str(path), str(folder / 'figures')],
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
         peak = float(out.split('peak')[-1])
         print(f'{SLOW_ROWS * factor:12,}{path.stat().st_size / 1e6:9.1f} MB{peak:13.0f} MB')
 
@@ -161,20 +173,37 @@ time.sleep(2.0)
 
 def recorder(folder: Path, options: argparse.Namespace) -> None:
     """Messages from other processes into a bag: how many, how many lost."""
-    env = os.environ | {'ROS_DOMAIN_ID': str(random.randrange(1, 100)),
-                        'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
+    env = os.environ | {
+        'ROS_DOMAIN_ID': str(random.randrange(1, 100)),
+        'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
+    }
     bag, publishers, seconds = folder / 'recorded', options.publishers, options.seconds
-    burners = [subprocess.Popen([sys.executable, '-S', '-c', 'while True: pass'])
-               for _ in range(options.burners)]
+    burners = [
+        subprocess.Popen([sys.executable, '-S', '-c', 'while True: pass'])
+        for _ in range(options.burners)
+    ]
     node = subprocess.Popen(
-        ['nice', '-n', str(options.nice), sys.executable, '-m', 'damadics_fd.commands.record', '--out',
-         str(bag)], env=env,
+        [
+            'nice',
+            '-n',
+            str(options.nice),
+            sys.executable,
+            '-m',
+            'damadics_fd.commands.record',
+            '--out',
+            str(bag),
+        ],
+        env=env,
     )
     time.sleep(3.0 + options.burners)
     share = [str(value) for value in (options.rate / publishers, seconds, options.depth)]
     sources = [
-        subprocess.Popen([sys.executable, '-c', PUBLISHER, f'/m{i}', *share], env=env,
-                         stdout=subprocess.PIPE, text=True)
+        subprocess.Popen(
+            [sys.executable, '-c', PUBLISHER, f'/m{i}', *share],
+            env=env,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
         for i in range(publishers)
     ]
     answers = [source.communicate()[0].split() for source in sources]
@@ -189,8 +218,10 @@ def recorder(folder: Path, options: argparse.Namespace) -> None:
     sent = sum(int(count) for count, _ in answers)
     got = sum(len(read_columns(bag, f'/m{i}', ['x1'])['x1']) for i in range(publishers))
     pace = sum(float(speed) for _, speed in answers)
-    print(f'{publishers} publishers, {pace:,.0f} messages/s for {seconds:g} s: {sent:,} sent,'
-          f' {got:,} recorded, {sent - got:,} lost; recorder {spent / seconds:.0%} of a core')
+    print(
+        f'{publishers} publishers, {pace:,.0f} messages/s for {seconds:g} s: {sent:,} sent,'
+        f' {got:,} recorded, {sent - got:,} lost; recorder {spent / seconds:.0%} of a core'
+    )
 
 
 def main() -> None:

@@ -32,9 +32,16 @@ def recording(n: int, rate: float) -> dict[str, np.ndarray]:
     t = np.arange(n) / rate
     x = 0.5 + 0.3 * np.sin(0.4 * t)
     noisy = x + 1.4e-3 * rng.standard_normal(n)
-    return {'stamp': (t * 1e9).astype(np.int64), 'cv': x, 'x1': noisy,
-            'p1': np.full(n, 3.5e6), 'p2': np.full(n, 2.6e6), 't1': np.full(n, 20.0),
-            'flow': np.full(n, 8.0), 'ps': 1.3e5 + 8e4 * (x + 0.01 * np.sign(np.cos(0.4 * t)))}
+    return {
+        'stamp': (t * 1e9).astype(np.int64),
+        'cv': x,
+        'x1': noisy,
+        'p1': np.full(n, 3.5e6),
+        'p2': np.full(n, 2.6e6),
+        't1': np.full(n, 20.0),
+        'flow': np.full(n, 8.0),
+        'ps': 1.3e5 + 8e4 * (x + 0.01 * np.sign(np.cos(0.4 * t))),
+    }
 
 
 def best(function: Callable[[], Any], repeat: int) -> float:
@@ -72,27 +79,32 @@ def plain_python(columns: dict[str, np.ndarray]) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument('--samples', type=int, default=1_000_000)
     parser.add_argument('--out', type=Path)
     options = parser.parse_args()
     few = 20_000
-    cases = {'paper': Settings.for_mode('paper'),
-             'monitor, approximator': Settings.for_mode('monitor', signature=False,
-                                                        own_alarm=False),
-             'monitor with signature': Settings.for_mode('monitor')}
+    cases = {
+        'paper': Settings.for_mode('paper'),
+        'monitor, approximator': Settings.for_mode('monitor', signature=False, own_alarm=False),
+        'monitor with signature': Settings.for_mode('monitor'),
+    }
     results: dict[str, dict[str, float]] = {}
     for name, settings in cases.items():
         columns = recording(options.samples, settings.sample_rate)
-        pieces = [{key: column[i:i + 8192] for key, column in columns.items()}
-                  for i in range(0, options.samples, 8192)]
+        pieces = [
+            {key: column[i : i + 8192] for key, column in columns.items()}
+            for i in range(0, options.samples, 8192)
+        ]
         run(pieces[0], settings)
 
         def loop(settings: Settings = settings, pieces: list = pieces) -> None:
             estimator, detector = Estimator(settings), Detector(settings)
             for piece in pieces:
                 run(piece, settings, estimator, detector)
+
         rows = list(zip(*(columns[key][:few].tolist() for key in NAMES), strict=True))
 
         def calls(settings: Settings = settings, rows: list = rows) -> None:
@@ -101,16 +113,22 @@ def main() -> None:
                 estimate = estimator.update(*row)
                 if estimate is not None:
                     detector.update(estimate)
+
         head = {key: column[:few] for key, column in columns.items()}
         reference = best(lambda head=head: plain_python(head), 3) / few * 1e6
         in_loop, per_call = best(loop, 5) / options.samples * 1e6, best(calls, 3) / few * 1e6
-        results[name] = {'us_per_sample_in_the_loop': in_loop, 'us_per_call': per_call,
-                         'us_plain_python_observer': reference,
-                         'loop_vs_plain_python': reference / in_loop,
-                         'million_samples_per_s': 1.0 / in_loop}
-        print(f'{name:24s} loop {in_loop:.4f} us/sample ({1.0 / in_loop:.1f} M samples/s), '
-              f'call {per_call:.2f} us, plain Python observer alone {reference:.2f} us: '
-              f'the loop is {reference / in_loop:.0f} times faster')
+        results[name] = {
+            'us_per_sample_in_the_loop': in_loop,
+            'us_per_call': per_call,
+            'us_plain_python_observer': reference,
+            'loop_vs_plain_python': reference / in_loop,
+            'million_samples_per_s': 1.0 / in_loop,
+        }
+        print(
+            f'{name:24s} loop {in_loop:.4f} us/sample ({1.0 / in_loop:.1f} M samples/s), '
+            f'call {per_call:.2f} us, plain Python observer alone {reference:.2f} us: '
+            f'the loop is {reference / in_loop:.0f} times faster'
+        )
     if options.out:
         options.out.write_text(json.dumps(results, indent=1) + '\n', encoding='utf-8')
 

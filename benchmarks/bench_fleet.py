@@ -33,7 +33,7 @@ from rich.console import Console
 from rich.table import Table
 
 sys.path.insert(0, str(Path(__file__).parents[1] / 'tests'))
-import website  # noqa: E402
+import website
 
 TICKS = os.sysconf('SC_CLK_TCK')
 WARM_UP = 5.0  # s after the first sample before CPU time is measured
@@ -52,11 +52,13 @@ class Counts:
         self.executor.add_node(self.node)
         self.values: dict[str, dict[str, str]] = defaultdict(dict)
         self.flags: set[str] = set()
-        self.node.create_subscription(DiagnosticArray, '/diagnostics', self._take,
-                                      QoSProfile(depth=1000))
+        self.node.create_subscription(
+            DiagnosticArray, '/diagnostics', self._take, QoSProfile(depth=1000)
+        )
         for valve in valves:
             self.node.create_subscription(
-                FaultFlag, f'/{valve}/fault_flag', lambda _, v=valve: self.flags.add(v), qos.FLAG)
+                FaultFlag, f'/{valve}/fault_flag', lambda _, v=valve: self.flags.add(v), qos.FLAG
+            )
 
     def _take(self, message: DiagnosticArray) -> None:
         for status in message.status:
@@ -95,23 +97,42 @@ def browser_processes() -> list[int]:
 
 
 def cpu_times(kinds: dict[str, list[int]]) -> dict[str, float]:
-    return {kind: sum(cpu(pid) for pid in pids if Path(f'/proc/{pid}').exists())
-            for kind, pids in kinds.items()}
+    return {
+        kind: sum(cpu(pid) for pid in pids if Path(f'/proc/{pid}').exists())
+        for kind, pids in kinds.items()
+    }
 
 
 def measure(options: argparse.Namespace, folder: Path) -> None:
     valves = [
-        Valve(f'lv{n:03d}', settings={'sample_rate': options.rate, 'actuator': f'LV-{n}',
-                                      'alarm_folder': ''},
-              simulate={'scenario': 'random_nominal', 'model': 'lugre', 'rate': options.rate,
-                        'noise': True, 'seed': n, 'duration': options.seconds,
-                        'wait_for_subscribers': 2})
+        Valve(
+            f'lv{n:03d}',
+            settings={'sample_rate': options.rate, 'actuator': f'LV-{n}', 'alarm_folder': ''},
+            simulate={
+                'scenario': 'random_nominal',
+                'model': 'lugre',
+                'rate': options.rate,
+                'noise': True,
+                'seed': n,
+                'duration': options.seconds,
+                'wait_for_subscribers': 2,
+            },
+        )
         for n in range(1, options.valves + 1)
     ]
     port = website.free_port()
-    tasks = tasks_of(valves, argparse.Namespace(
-        record=None, dashboard=True, simulate=True, port=port, host='127.0.0.1', show=False,
-        processes=options.processes))
+    tasks = tasks_of(
+        valves,
+        argparse.Namespace(
+            record=None,
+            dashboard=True,
+            simulate=True,
+            port=port,
+            host='127.0.0.1',
+            show=False,
+            processes=options.processes,
+        ),
+    )
     domain = free_domain()
     environment = {**surroundings(domain), 'XDG_STATE_HOME': str(folder / 'state')}
     with Processes(folder / 'logs', environment) as processes, website.browser() as chromium:
@@ -139,8 +160,9 @@ def measure(options: argparse.Namespace, folder: Path) -> None:
         plants = [task for task in tasks if task.executable == 'plant']
         for task in plants:
             start(task)
-        while any(counts.values[f'{v.name}/detector'].get('Estimates judged', '0') == '0'
-                  for v in valves):
+        while any(
+            counts.values[f'{v.name}/detector'].get('Estimates judged', '0') == '0' for v in valves
+        ):
             counts.spin(0.2)
         if chromium:
             kinds['browser'] = browser_processes()
@@ -157,8 +179,10 @@ def measure(options: argparse.Namespace, folder: Path) -> None:
         while late := [task.label for task in plants if not processes.ended(task.label)]:
             counts.spin(0.5)
             if time.monotonic() > deadline:
-                raise SystemExit(f'{", ".join(late)} did not end; the last words of the first:\n'
-                                 + processes.log(late[0]).read_text()[-1000:])
+                raise SystemExit(
+                    f'{", ".join(late)} did not end; the last words of the first:\n'
+                    + processes.log(late[0]).read_text()[-1000:]
+                )
         counts.spin(LAST_WORDS)
         report(valves, kinds, used, span, counts, processes, updates)
         counts.close()
@@ -196,8 +220,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
     parser.add_argument('--valves', type=int, default=10)
     parser.add_argument('--rate', type=float, default=200.0, help='samples per second [Hz]')
-    parser.add_argument('--processes', type=int, default=0, metavar='N',
-                        help='all estimators and detectors in N processes; 0: each in its own')
+    parser.add_argument(
+        '--processes',
+        type=int,
+        default=0,
+        metavar='N',
+        help='all estimators and detectors in N processes; 0: each in its own',
+    )
     parser.add_argument('--seconds', type=float, default=60.0, help='length of the run [s]')
     with tempfile.TemporaryDirectory() as folder:
         measure(parser.parse_args(), Path(folder))

@@ -22,9 +22,12 @@ import numpy as np
 from damadics_plant import simulate
 
 CASES = [
-    ('dablib', 400, 'paper_nominal', False), ('dablib', 400, 'paper_friction', False),
-    ('dablib', 400, 'paper_nominal', True), ('dablib', 1, 'nominal', False),
-    ('lugre', 200, 'paper_nominal', False), ('lugre', 200, 'paper_friction', False),
+    ('dablib', 400, 'paper_nominal', False),
+    ('dablib', 400, 'paper_friction', False),
+    ('dablib', 400, 'paper_nominal', True),
+    ('dablib', 1, 'nominal', False),
+    ('lugre', 200, 'paper_nominal', False),
+    ('lugre', 200, 'paper_friction', False),
     ('lugre', 200, 'random_spring', True),
 ]
 
@@ -41,14 +44,23 @@ def speed(model, rate, scenario, noise, runs=9, duration=120.0):
 
 def uncompiled(model, rate):
     """Return the same for the source as plain Python."""
-    code = f'import bench_plant; print(bench_plant.speed({model!r}, {rate}, ' \
-           '"paper_nominal", False, runs=1, duration=1.0))'
+    code = (
+        f'import bench_plant; print(bench_plant.speed({model!r}, {rate}, '
+        '"paper_nominal", False, runs=1, duration=1.0))'
+    )
     environment = os.environ | {
         'NUMBA_DISABLE_JIT': '1',
         'PYTHONPATH': os.pathsep.join([str(Path(__file__).parent), *sys.path]),
     }
-    return float(subprocess.run([sys.executable, '-c', code], env=environment, check=True,
-                                capture_output=True, text=True).stdout)
+    return float(
+        subprocess.run(
+            [sys.executable, '-c', code],
+            env=environment,
+            check=True,
+            capture_output=True,
+            text=True,
+        ).stdout
+    )
 
 
 def radau():
@@ -74,10 +86,19 @@ def main():
     rows = []
     for model, rate, scenario, noise in CASES:
         factor = speed(model, rate, scenario, noise)
-        rows.append({'model': model, 'rate_hz': rate, 'scenario': scenario, 'noise': noise,
-                     'times_real_time': round(factor)})
-        print(f'{model:7} {rate:4} Hz  {scenario:15} {"noise" if noise else "     "}'
-              f' {factor:8.0f} x real time')
+        rows.append(
+            {
+                'model': model,
+                'rate_hz': rate,
+                'scenario': scenario,
+                'noise': noise,
+                'times_real_time': round(factor),
+            }
+        )
+        print(
+            f'{model:7} {rate:4} Hz  {scenario:15} {"noise" if noise else "     "}'
+            f' {factor:8.0f} x real time'
+        )
     plain = {model: uncompiled(model, rate) for model, rate in (('dablib', 400), ('lugre', 200))}
     for model, factor in plain.items():
         ratio = next(r['times_real_time'] for r in rows if r['model'] == model) / factor
@@ -86,11 +107,19 @@ def main():
     ratio = next(r['times_real_time'] for r in rows if r['model'] == 'lugre') / general
     print(f'lugre   the whole plant is {ratio:.0f} times as fast as the stem alone under Radau')
     if out:
-        out.write_text(json.dumps({
-            'machine': platform.processor() or platform.machine(), 'cores': os.cpu_count(),
-            'python': platform.python_version(), 'runs': rows,
-            'uncompiled_times_real_time': plain, 'radau_times_real_time': general,
-        }, indent=1))
+        out.write_text(
+            json.dumps(
+                {
+                    'machine': platform.processor() or platform.machine(),
+                    'cores': os.cpu_count(),
+                    'python': platform.python_version(),
+                    'runs': rows,
+                    'uncompiled_times_real_time': plain,
+                    'radau_times_real_time': general,
+                },
+                indent=1,
+            )
+        )
 
 
 if __name__ == '__main__':

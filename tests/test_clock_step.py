@@ -25,8 +25,11 @@ HOUR = 3600.0
 def stepped(tmp_path, domain):
     """Processes whose system clock can be set, and how to set it [s]."""
     library, file = tmp_path / 'clock_step.so', tmp_path / 'step'
-    subprocess.run(['cc', '-O1', '-shared', '-fPIC', '-o', library, SOURCE, '-ldl', '-pthread'],
-                   check=True, timeout=60)
+    subprocess.run(
+        ['cc', '-O1', '-shared', '-fPIC', '-o', library, SOURCE, '-ldl', '-pthread'],
+        check=True,
+        timeout=60,
+    )
     file.write_bytes(struct.pack('d', 0.0))
     preload = {'LD_PRELOAD': str(library), 'CLOCK_STEP_FILE': str(file)}
     with Processes(tmp_path / 'logs', {**surroundings(domain), **preload}) as processes:
@@ -40,8 +43,14 @@ def test_silence_is_noticed_when_the_clock_was_set(stepped, peer, step):
     reports = peer.listen(DiagnosticArray, '/diagnostics', QoSProfile(depth=100))
     processes.start('damadics_fd', 'estimator', parameters(**SETTINGS))
     processes.start('damadics_fd', 'detector', parameters(alarm_folder='', **SETTINGS))
-    assert peer.wait(lambda: flags and peer.node.count_subscribers('/measurement')
-                     and peer.node.count_publishers('/estimate'), 30.0)
+    assert peer.wait(
+        lambda: (
+            flags
+            and peer.node.count_subscribers('/measurement')
+            and peer.node.count_publishers('/estimate')
+        ),
+        30.0,
+    )
     for n in range(1, 200):
         peer.send(n * PERIOD, 0.5, 0.5)
         peer.wait(lambda: False, PERIOD * 1e-9)

@@ -17,8 +17,10 @@ from damadics_msgs.msg import FaultEvent, FaultFlag
 sync_api = pytest.importorskip('playwright.sync_api')
 pytestmark = [
     pytest.mark.ros,
-    pytest.mark.skipif(not website.CHROMIUM.is_file(),
-                       reason='no browser: apt-get install chromium for the tests of the page'),
+    pytest.mark.skipif(
+        not website.CHROMIUM.is_file(),
+        reason='no browser: apt-get install chromium for the tests of the page',
+    ),
 ]
 ROOT = Path(__file__).resolve().parents[1]
 BAG = ROOT / 'bags' / 'lugre_friction.mcap'
@@ -59,8 +61,15 @@ def system(tmp_path_factory):
             processes.start('damadics_plant', 'plant', arguments_of(PLANT, namespace=VALVE))
             site = Site(processes, port, folder / 'page')
             with website.browser() as browser:
-                yield SimpleNamespace(peer=peer, flags=flags, events=events, browser=browser,
-                                      processes=processes, site=site, errors=[])
+                yield SimpleNamespace(
+                    peer=peer,
+                    flags=flags,
+                    events=events,
+                    browser=browser,
+                    processes=processes,
+                    site=site,
+                    errors=[],
+                )
         peer.close()
 
 
@@ -136,8 +145,9 @@ def test_an_injected_fault_shows_within_a_second_of_its_flag(system, page):
 def test_acknowledge_reaches_the_detector_and_the_row(system, page):
     page.goto(system.site.address)
     page.get_by_label(f'Acknowledge alarm of {VALVE}').click()
-    assert wait_for(system, lambda: any(
-        e.transition == FaultEvent.ACKNOWLEDGED for e in system.events), 15.0)
+    assert wait_for(
+        system, lambda: any(e.transition == FaultEvent.ACKNOWLEDGED for e in system.events), 15.0
+    )
     page.wait_for_selector('[data-occurrence] .tag.done >> text=acknowledged')
     page.get_by_label(f'Acknowledge alarm of {VALVE}').wait_for(state='hidden')
 
@@ -159,7 +169,8 @@ def test_history_survives_a_restart_of_the_page(system, page):
     page.wait_for_timeout(2500)  # the detector repeats its events to the newcomer
     wait_for(system, lambda: False, 0.3)
     assert page.locator('table.list td >> text=/^raised$/').count() == sum(
-        e.transition == FaultEvent.RAISED for e in system.events)
+        e.transition == FaultEvent.RAISED for e in system.events
+    )
     assert rows > 0
 
 
@@ -167,16 +178,19 @@ def test_a_killed_detector_greys_the_tile_within_a_second_and_its_alarm_comes_ba
     page.goto(system.site.address)
     page.wait_for_selector(f'[data-valve={VALVE}]')
     page.wait_for_function(
-        f"'MSF'.includes(document.querySelector('[data-valve={VALVE}]').dataset.kind)")
+        f"'MSF'.includes(document.querySelector('[data-valve={VALVE}]').dataset.kind)"
+    )
     system.processes.kill('detector')
     killed = time.monotonic()
     page.wait_for_function(
-        f"document.querySelector('[data-valve={VALVE}]').dataset.kind == 'off'", polling=20)
+        f"document.querySelector('[data-valve={VALVE}]').dataset.kind == 'off'", polling=20
+    )
     assert time.monotonic() - killed < 1.0
     system.processes.start('damadics_fd', 'detector', arguments_of(SETTINGS, namespace=VALVE))
     page.wait_for_function(
         f"'MSF'.includes(document.querySelector('[data-valve={VALVE}]').dataset.kind)",
-        timeout=60_000)
+        timeout=60_000,
+    )
     page.wait_for_selector('[data-occurrence] .tag.done >> text=acknowledged')
 
 
@@ -200,13 +214,17 @@ def test_everything_can_be_reached_with_the_keyboard(system, page):
     reached = set()
     for _ in range(25):
         page.keyboard.press('Tab')
-        reached.add(page.evaluate(
-            'document.activeElement.dataset.valve || document.activeElement.ariaLabel || '
-            'document.activeElement.textContent.trim()'))
+        reached.add(
+            page.evaluate(
+                'document.activeElement.dataset.valve || document.activeElement.ariaLabel || '
+                'document.activeElement.textContent.trim()'
+            )
+        )
     assert {'Skip to content', 'Replay', VALVE, f'Shelve alarm of {VALVE}'} <= reached
     unnamed = page.evaluate(
         "[...document.querySelectorAll('button, a')].filter(e => e.offsetParent && "
-        "!(e.ariaLabel || e.textContent.trim())).length")
+        '!(e.ariaLabel || e.textContent.trim())).length'
+    )
     assert unnamed == 0
 
 

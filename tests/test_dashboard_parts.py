@@ -93,11 +93,17 @@ def test_slow_samples_are_not_taken_for_silence():
     assert valve.condition(101.0).kind == 'ok'
 
 
-@pytest.mark.parametrize(('state', 'level', 'kind'), [
-    (FaultFlag.STATE_ALARM, 1, 'M'), (FaultFlag.STATE_ALARM, 2, 'S'),
-    (FaultFlag.STATE_LATCHED, 4, 'F'), (FaultFlag.STATE_SHELVED, 3, 'C'),
-    (FaultFlag.STATE_LEARNING, 3, 'learn'), (FaultFlag.STATE_HEALTHY, 0, 'ok'),
-])
+@pytest.mark.parametrize(
+    ('state', 'level', 'kind'),
+    [
+        (FaultFlag.STATE_ALARM, 1, 'M'),
+        (FaultFlag.STATE_ALARM, 2, 'S'),
+        (FaultFlag.STATE_LATCHED, 4, 'F'),
+        (FaultFlag.STATE_SHELVED, 3, 'C'),
+        (FaultFlag.STATE_LEARNING, 3, 'learn'),
+        (FaultFlag.STATE_HEALTHY, 0, 'ok'),
+    ],
+)
 def test_every_state_has_its_class(state, level, kind):
     valve = Valve('lv101')
     valve.take_flag(flag(state, level, 1), 100.0)
@@ -106,10 +112,23 @@ def test_every_state_has_its_class(state, level, kind):
 
 
 def event(transition: int, text: str = 'raised', occurrence: int = 1, stamp: int = 5) -> dict:
-    return {'valve': 'lv101', 'stamp': stamp, 'transition': transition, 'occurrence': occurrence,
-            'level': 4, 'onset': 4, 'residual': 0.4, 'threshold': 0.2, 'ratio': 2.0,
-            'duration': 1.0, 'cause': 'friction', 'confidence': None, 'strength': 0.5,
-            'text': text, 'advice': 'look'}
+    return {
+        'valve': 'lv101',
+        'stamp': stamp,
+        'transition': transition,
+        'occurrence': occurrence,
+        'level': 4,
+        'onset': 4,
+        'residual': 0.4,
+        'threshold': 0.2,
+        'ratio': 2.0,
+        'duration': 1.0,
+        'cause': 'friction',
+        'confidence': None,
+        'strength': 0.5,
+        'text': text,
+        'advice': 'look',
+    }
 
 
 def test_texts_from_outside_are_escaped_everywhere():
@@ -120,7 +139,8 @@ def test_texts_from_outside_are_escaped_everywhere():
     valve.take_event({**event(FaultEvent.RAISED, evil), 'cause': evil, 'advice': evil})
     valve.name = evil
     pages = [
-        markup.tile(valve, 100.1), markup.banner(valve, valve.condition(100.1), 100.1),
+        markup.tile(valve, 100.1),
+        markup.banner(valve, valve.condition(100.1), 100.1),
         markup.alarm_body(valve, valve.alarm(), name=True),
         markup.history_table([{**event(0, evil), 'valve': evil}], name=True),
     ]

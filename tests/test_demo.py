@@ -15,7 +15,9 @@ def demo(tmp_path_factory):
     out = tmp_path_factory.mktemp('demo')
     done = subprocess.run(
         [executable('damadics_bringup', 'demo'), '--out', str(out)],
-        capture_output=True, text=True, timeout=280,
+        capture_output=True,
+        text=True,
+        timeout=280,
     )
     assert done.returncode == 0, done.stdout + done.stderr
     return json.loads((out / 'results.json').read_text()), done.stdout

@@ -98,8 +98,10 @@ def test_ros2_run_hands_over_arguments_and_exit_code():
 
 
 def installed() -> list[str]:
-    return [f'{path.parent.name} {path.name}'
-            for path in sorted((ROOT / 'ros2_ws' / 'install').glob('*/lib/damadics_*/*'))]
+    return [
+        f'{path.parent.name} {path.name}'
+        for path in sorted((ROOT / 'ros2_ws' / 'install').glob('*/lib/damadics_*/*'))
+    ]
 
 
 @pytest.mark.parametrize('command', installed())
@@ -110,10 +112,15 @@ def test_every_command_explains_itself_with_an_example(command):
     assert done.stderr == ''
 
 
-@pytest.mark.parametrize('command', [
-    'damadics_fd estimator', 'damadics_fd detector', 'damadics_plant plant',
-    'damadics_fd monitors estimator -- plant --ros-args',
-])
+@pytest.mark.parametrize(
+    'command',
+    [
+        'damadics_fd estimator',
+        'damadics_fd detector',
+        'damadics_plant plant',
+        'damadics_fd monitors estimator -- plant --ros-args',
+    ],
+)
 def test_a_node_refuses_words_that_it_would_not_see(command):
     done = sourced(f'timeout 30 ros2 run {command} mode:=paper')
     assert done.returncode == 2
@@ -137,7 +144,9 @@ def fresh(tmp_path):
         return subprocess.run(
             [sys.executable, tmp_path / 'tools' / 'setup_env.py'],
             env={**os.environ, 'ROS_DISTRO': '', **environment},
-            capture_output=True, text=True, timeout=60,
+            capture_output=True,
+            text=True,
+            timeout=60,
         )
 
     return run
@@ -163,7 +172,11 @@ def test_setup_is_done_once_only():
     clean = {k: v for k, v in os.environ.items() if k not in ('ROS_DISTRO', 'MAKEFLAGS')}
     done = subprocess.run(
         ['make', '-s', 'env', f'PYTHON={Path(sys.prefix, "bin", "python")}'],
-        cwd=ROOT, env=clean, capture_output=True, text=True, timeout=60,
+        cwd=ROOT,
+        env=clean,
+        capture_output=True,
+        text=True,
+        timeout=60,
     )
     assert (done.returncode, done.stdout) == (0, ''), done.stderr
 

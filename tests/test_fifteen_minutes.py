@@ -42,11 +42,19 @@ def first(tmp_path_factory, chromium):
     folder = tmp_path_factory.mktemp('first_look')
     port = website.free_port()
     fleet = folder / 'fleet.yaml'
-    fleet.write_text(yaml.safe_dump({'valves': {VALVE: {
-        'settings': {'actuator': 'LV-101', **website.LEARN_QUICKLY},
-        # estimator, recorder and page, so that the bag begins with the first sample
-        'simulate': {**website.PLANT, 'wait_for_subscribers': 3},
-    }}}))
+    fleet.write_text(
+        yaml.safe_dump(
+            {
+                'valves': {
+                    VALVE: {
+                        'settings': {'actuator': 'LV-101', **website.LEARN_QUICKLY},
+                        # estimator, recorder and page, so that the bag begins with the first sample  # noqa: E501
+                        'simulate': {**website.PLANT, 'wait_for_subscribers': 3},
+                    }
+                }
+            }
+        )
+    )
     with pytest.MonkeyPatch.context() as patch:
         domain = alone(patch, folder)
         peer = Peer(domain, publishes=False)
@@ -54,15 +62,32 @@ def first(tmp_path_factory, chromium):
         events = peer.listen(FaultEvent, f'/{VALVE}/fault_event', qos.EVENTS)
         with Processes(folder / 'logs', surroundings(domain)) as processes:
             processes.forget('PYTEST_CURRENT_TEST')  # the page is to run as it does elsewhere
-            processes.start('damadics_bringup', 'run', [
-                str(fleet), '--simulate', '--dashboard', '--port', str(port),
-                '--record', str(folder / 'bag'), '--logs', str(folder / 'logs')])
+            processes.start(
+                'damadics_bringup',
+                'run',
+                [
+                    str(fleet),
+                    '--simulate',
+                    '--dashboard',
+                    '--port',
+                    str(port),
+                    '--record',
+                    str(folder / 'bag'),
+                    '--logs',
+                    str(folder / 'logs'),
+                ],
+            )
             address = f'http://127.0.0.1:{port}'
             website.wait_until_served(address)
             yield SimpleNamespace(
-                peer=peer, flags=flags, events=events, processes=processes, folder=folder,
+                peer=peer,
+                flags=flags,
+                events=events,
+                processes=processes,
+                folder=folder,
                 bag=folder / 'bag',
-                tile=website.Tile(address, VALVE, chromium and chromium.new_page()))
+                tile=website.Tile(address, VALVE, chromium and chromium.new_page()),
+            )
             if not processes.ended('run'):
                 processes.end('run', 90.0)
         peer.close()
@@ -70,8 +95,11 @@ def first(tmp_path_factory, chromium):
 
 def rises(first) -> list[int]:
     """Return the stamps at which an alarm was raised [ns], as the topic tells."""
-    return [e.header.stamp.sec * 10**9 + e.header.stamp.nanosec for e in first.events
-            if e.transition == FaultEvent.RAISED]
+    return [
+        e.header.stamp.sec * 10**9 + e.header.stamp.nanosec
+        for e in first.events
+        if e.transition == FaultEvent.RAISED
+    ]
 
 
 def replayed(*words: object) -> list[dict]:
@@ -80,7 +108,10 @@ def replayed(*words: object) -> list[dict]:
     out.parent.mkdir(parents=True, exist_ok=True)
     done = subprocess.run(
         [executable('damadics_fd', 'replay'), *map(str, words), '--jobs', '1', '--out', str(out)],
-        capture_output=True, text=True, timeout=120)
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
     assert done.returncode == 0, done.stderr
     return json.loads(out.read_text())
 
@@ -121,7 +152,12 @@ def test_the_recorded_bag_gives_the_same_flag_time(first):
     assert len(rises(first)) == 1, 'the restart raised an alarm'
     started = children(first.processes.pid('run'))
     assert {child.name for child in started} == {
-        'recorder', 'estimator', 'detector', 'plant', 'dashboard'}
+        'recorder',
+        'estimator',
+        'detector',
+        'plant',
+        'dashboard',
+    }
     first.processes.end('run', 90.0)
     left = [child for child in started if Path(f'/proc/{child.pid}').exists()]
     assert not left, 'processes are left'
@@ -133,9 +169,13 @@ def test_a_truncated_bag_is_replayed(first):
     (bag,) = first.bag.glob('*.mcap')
     whole = bag.read_bytes()
     torn = first.folder / 'torn.mcap'
-    torn.write_bytes(whole[:len(whole) * 9 // 10])
-    verdict = subprocess.run([executable('damadics_fd', 'verify'), str(torn)],
-                             capture_output=True, text=True, timeout=60)
+    torn.write_bytes(whole[: len(whole) * 9 // 10])
+    verdict = subprocess.run(
+        [executable('damadics_fd', 'verify'), str(torn)],
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
     assert verdict.returncode == 3, verdict.stdout
     (result,) = replayed(torn, *QUICKLY)
     assert result['detections'][0]['stamp'] == rises(first)[0]
@@ -156,8 +196,9 @@ def stuck(since: float, folder: Path) -> Path:
     return path
 
 
-@pytest.mark.skipif(not LUBLIN.is_file(),
-                    reason=f'{LUBLIN} is not there: it carries no redistribution licence')
+@pytest.mark.skipif(
+    not LUBLIN.is_file(), reason=f'{LUBLIN} is not there: it carries no redistribution licence'
+)
 def test_the_real_plant_gives_no_alarm_and_a_stuck_stem_one(domain, tmp_path):
     instants = [LEARNED + 50.0 * n for n in range(1, 6)]
     files = [stuck(since, tmp_path) for since in instants]
@@ -173,8 +214,22 @@ def test_the_report_compares_with_what_else_there_is(tmp_path, chromium, monkeyp
     pytest.importorskip('filterpy')
     pytest.importorskip('river')
     evaluate = executable('damadics_evaluate', 'evaluate')
-    campaign = ['run', '--out', str(tmp_path), '--scenarios', 'f16_B', '--detectors', 'scada',
-                'cusum', 'ekf', 'adwin', '--calibration-days', '1', '--isolated-seeds', '0']
+    campaign = [
+        'run',
+        '--out',
+        str(tmp_path),
+        '--scenarios',
+        'f16_B',
+        '--detectors',
+        'scada',
+        'cusum',
+        'ekf',
+        'adwin',
+        '--calibration-days',
+        '1',
+        '--isolated-seeds',
+        '0',
+    ]
     monkeypatch.setenv('DAMADICS_FD_CACHE', str(tmp_path / 'cache'))
     done = subprocess.run([evaluate, *campaign], capture_output=True, text=True, timeout=250)
     assert done.returncode == 0, done.stderr

@@ -25,11 +25,18 @@ RATE = 50.0  # Hz
 
 
 def entry(number: int, name: str) -> dict:
-    learning = {'t_on': 1.0, 't_w': 5.0, 't_learn': 600.0 if name == SLOW else 25.0,
-                'travel_min': 0.5}
+    learning = {
+        't_on': 1.0,
+        't_w': 5.0,
+        't_learn': 600.0 if name == SLOW else 25.0,
+        'travel_min': 0.5,
+    }
     return {
-        'settings': {'actuator': f'{name[:2].upper()}-{name[2:]}', 'sample_rate': RATE,
-                     **learning},
+        'settings': {
+            'actuator': f'{name[:2].upper()}-{name[2:]}',
+            'sample_rate': RATE,
+            **learning,
+        },
         'simulate': {**website.PLANT, 'rate': RATE, 'seed': number},
     }
 
@@ -45,18 +52,33 @@ def fleet(tmp_path_factory):
         domain = alone(patch, folder)
         peer = Peer(domain, publishes=False)
         flags = {v: peer.listen(FaultFlag, f'/{v}/fault_flag', qos.FLAG) for v in VALVES}
-        with (Processes(folder / 'logs', surroundings(domain)) as processes,
-              website.browser() as chromium):
+        with (
+            Processes(folder / 'logs', surroundings(domain)) as processes,
+            website.browser() as chromium,
+        ):
             processes.forget('PYTEST_CURRENT_TEST')  # the page is to run as it does elsewhere
-            processes.start('damadics_bringup', 'run', [
-                str(path), '--simulate', '--dashboard', '--port', str(port), '--processes', '2',
-                '--logs', str(folder / 'logs')])
+            processes.start(
+                'damadics_bringup',
+                'run',
+                [
+                    str(path),
+                    '--simulate',
+                    '--dashboard',
+                    '--port',
+                    str(port),
+                    '--processes',
+                    '2',
+                    '--logs',
+                    str(folder / 'logs'),
+                ],
+            )
             address = f'http://127.0.0.1:{port}'
             website.wait_until_served(address)
             page = chromium.new_page(viewport={'width': 1280, 'height': 800}) if chromium else None
             tiles = {v: website.Tile(address, v, page) for v in VALVES}
-            yield SimpleNamespace(peer=peer, flags=flags, tiles=tiles, page=page,
-                                  run=processes.pid('run'))
+            yield SimpleNamespace(
+                peer=peer, flags=flags, tiles=tiles, page=page, run=processes.pid('run')
+            )
             processes.end('run', 60.0)
         peer.close()
 
@@ -75,9 +97,12 @@ def call(fleet, kind, name: str, **request) -> None:
 
 def test_every_valve_has_its_own_state(fleet):
     learned = [valve for valve in VALVES if valve != SLOW]
-    assert fleet.peer.wait(lambda: all(
-        fleet.flags[v] and fleet.flags[v][-1].state == FaultFlag.STATE_HEALTHY for v in learned
-    ), 180.0), 'not all valves have been learned'
+    assert fleet.peer.wait(
+        lambda: all(
+            fleet.flags[v] and fleet.flags[v][-1].state == FaultFlag.STATE_HEALTHY for v in learned
+        ),
+        180.0,
+    ), 'not all valves have been learned'
     call(fleet, InjectFault, f'/{FAULTY}/inject_fault', fault=SPRING, strength=1.0)
     call(fleet, Shelve, f'/{SHELVED}/shelve', duration=600.0, user='Anna')
     assert fleet.peer.wait(lambda: fleet.flags[FAULTY][-1].fault, 60.0)
@@ -86,8 +111,9 @@ def test_every_valve_has_its_own_state(fleet):
     fleet.peer.wait(lambda: False, 15.0 if website.PICTURES else 3.0)
     if fleet.page:
         website.picture(fleet.page, 'fleet.png')
-    others = {valve: kind for valve, kind in kinds(fleet).items()
-              if valve not in (FAULTY, SHELVED, SLOW)}
+    others = {
+        valve: kind for valve, kind in kinds(fleet).items() if valve not in (FAULTY, SHELVED, SLOW)
+    }
     assert set(others.values()) == {'ok'}, others
     assert not any(flag.fault for v in VALVES if v != FAULTY for flag in fleet.flags[v])
 
@@ -108,8 +134,11 @@ def test_silence_greys_every_tile_and_ends_without_an_alarm(fleet):
             tile.wait(('off',), 3.0)
         if fleet.page:
             website.picture(fleet.page, 'silent.png')
-        assert fleet.peer.wait(lambda: all(
-            flags[-1].state == FaultFlag.STATE_NOT_MONITORING for flags in fleet.flags.values()))
+        assert fleet.peer.wait(
+            lambda: all(
+                flags[-1].state == FaultFlag.STATE_NOT_MONITORING for flags in fleet.flags.values()
+            )
+        )
     finally:
         for pid in plants:
             os.kill(pid, signal.SIGCONT)

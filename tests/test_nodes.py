@@ -31,18 +31,23 @@ def chain(processes, peer):
     """Start estimator and detector in paper mode and listen to all that they say."""
     for name in ('estimator', 'detector'):
         processes.start('damadics_fd', name, parameters(mode='paper'))
-    for kind, topic in ((Estimate, 'estimate'), (Float64Stamped, 'residual'),
-                        (Float64Stamped, 'threshold')):
+    for kind, topic in (
+        (Estimate, 'estimate'),
+        (Float64Stamped, 'residual'),
+        (Float64Stamped, 'threshold'),
+    ):
         peer.listen(kind, topic, qos.SAMPLES)
     peer.listen(FaultFlag, 'fault_flag', qos.FLAG)
     peer.listen(FaultEvent, 'fault_event', qos.EVENTS)
     peer.listen(DiagnosticArray, '/diagnostics', qos.DIAGNOSTICS)
     graph = peer.node
     assert peer.wait(
-        lambda: peer.publisher.get_subscription_count() == 1
-        and graph.count_subscribers('/estimate') == 2
-        and graph.count_publishers('/residual') == 1
-        and peer.got['fault_flag'],
+        lambda: (
+            peer.publisher.get_subscription_count() == 1
+            and graph.count_subscribers('/estimate') == 2
+            and graph.count_publishers('/residual') == 1
+            and peer.got['fault_flag']
+        ),
         20.0,
     ), 'the nodes did not start'
     peer.wait(lambda: False, 0.5)
@@ -72,7 +77,8 @@ def test_the_nodes_give_what_the_core_gives_bit_for_bit(chain):
     events = chain.got['fault_event']
     raised = [m.header.stamp for m in events if m.transition == FaultEvent.RAISED]
     assert [stamp.sec * 10**9 + stamp.nanosec for stamp in raised] == [
-        event.stamp for event in result.detections]
+        event.stamp for event in result.detections
+    ]
 
 
 def test_bad_samples_do_not_reach_the_filters_and_are_counted(chain):
@@ -98,14 +104,25 @@ def test_bad_samples_do_not_reach_the_filters_and_are_counted(chain):
     assert [m.xi2 for m in chain.got['estimate']] == result.estimates['xi2'].tolist()
     reports = [s for m in chain.got['/diagnostics'] for s in m.status if 'estimator' in s.name]
     values = {v.key: v.value for v in reports[-1].values}
-    counts = {k: values[f'Samples {k}'] for k in
-              ('not finite', 'out of range', 'duplicate', 'out of order')}
-    assert counts == {'not finite': '2', 'out of range': '1', 'duplicate': '1',
-                      'out of order': '1'}
+    counts = {
+        k: values[f'Samples {k}']
+        for k in ('not finite', 'out of range', 'duplicate', 'out of order')
+    }
+    assert counts == {
+        'not finite': '2',
+        'out of range': '1',
+        'duplicate': '1',
+        'out of order': '1',
+    }
 
 
-@pytest.mark.parametrize(('signal', 'value', 'ne107'), [  # IN-1, IN-2
-    ('x1', float('nan'), 'failure'), ('cv', 55.0, 'out of specification')])
+@pytest.mark.parametrize(
+    ('signal', 'value', 'ne107'),
+    [  # IN-1, IN-2
+        ('x1', float('nan'), 'failure'),
+        ('cv', 55.0, 'out of specification'),
+    ],
+)
 def test_lasting_bad_input_is_told_as_a_failed_sensor(chain, signal, value, ne107):
     columns = {name: column[:1] for name, column in moving_stem(1).items()}
     chain.send_columns(columns)
@@ -127,8 +144,9 @@ def test_lasting_bad_input_is_told_as_a_failed_sensor(chain, signal, value, ne10
     assert f'{signal} = {value:g}' in status.message
     assert 'check' in status.message
     assert {v.key: v.value for v in status.values}['NE 107'] == ne107
-    assert chain.wait(lambda: chain.got['fault_flag'][-1].state
-                      == FaultFlag.STATE_NOT_MONITORING, 3.0)
+    assert chain.wait(
+        lambda: chain.got['fault_flag'][-1].state == FaultFlag.STATE_NOT_MONITORING, 3.0
+    )
     assert chain.got['fault_flag'][-1].level != FaultFlag.NE107_NORMAL
     assert not chain.got['fault_flag'][-1].fault
     before = len(chain.got['estimate'])
@@ -165,19 +183,27 @@ def test_a_node_alone_says_what_it_waits_for(processes, name):
 
 
 @pytest.mark.parametrize('name', ['estimator', 'detector', 'recorder', 'plant', 'dashboard'])
-@pytest.mark.parametrize('numbers', [
-    (signal.SIGINT,), (signal.SIGTERM,), (signal.SIGINT, signal.SIGINT),
-], ids=['Ctrl-C', 'kill', 'launch'])  # launch passes a Ctrl-C on that has reached the node before
+@pytest.mark.parametrize(
+    'numbers',
+    [
+        (signal.SIGINT,),
+        (signal.SIGTERM,),
+        (signal.SIGINT, signal.SIGINT),
+    ],
+    ids=['Ctrl-C', 'kill', 'launch'],
+)  # launch passes a Ctrl-C on that has reached the node before
 def test_signals_end_a_node_with_exit_code_0(domain, tmp_path, name, numbers):
     arguments = {
         'recorder': ['--all', '--out', str(tmp_path / 'bag')],
         'dashboard': ['--port', str(website.free_port()), '--state', str(tmp_path)],
     }.get(name, [])
     package = {'plant': 'damadics_plant', 'dashboard': 'damadics_dashboard'}.get(
-        name, 'damadics_fd')
+        name, 'damadics_fd'
+    )
     process = subprocess.Popen(
         [executable(package, name), *arguments],
-        stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
         env={k: v for k, v in {**os.environ, **SPEAK_AT_ONCE}.items() if k != PYTEST},
     )
     try:
@@ -199,6 +225,10 @@ def test_all_mistakes_in_the_parameters_are_listed(domain, name):
         [executable('damadics_fd', name), *wrong], capture_output=True, text=True, timeout=30
     )
     assert done.returncode == 1
-    for cause in ('k1: -1.0 is not within', 'tau: 0 is not a number with a decimal point',
-                  'no_such: there is no such parameter', "decide_m: 'two' is not"):
+    for cause in (
+        'k1: -1.0 is not within',
+        'tau: 0 is not a number with a decimal point',
+        'no_such: there is no such parameter',
+        "decide_m: 'two' is not",
+    ):
         assert cause in done.stderr

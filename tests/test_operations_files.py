@@ -40,13 +40,15 @@ class Configuration:
 
 def described(path: Path, monkeypatch, **given: str) -> list:
     """Run a launch file with stand-ins of `launch` that only remember."""
+
     def remember(kind):
         return lambda *args, **kwargs: SimpleNamespace(kind=kind, args=args, **kwargs)
 
     modules = {
         'launch': {'LaunchDescription': lambda actions: actions},
-        'launch.actions': {name: remember(name)
-                           for name in ('DeclareLaunchArgument', 'OpaqueFunction')},
+        'launch.actions': {
+            name: remember(name) for name in ('DeclareLaunchArgument', 'OpaqueFunction')
+        },
         'launch.conditions': {'IfCondition': remember('IfCondition')},
         'launch.substitutions': {'LaunchConfiguration': Configuration},
         'launch_ros': {},
@@ -61,7 +63,8 @@ def described(path: Path, monkeypatch, **given: str) -> list:
     spec.loader.exec_module(module)
     actions = module.generate_launch_description()
     Configuration.values = {
-        a.args[0]: getattr(a, 'default_value', '') for a in actions
+        a.args[0]: getattr(a, 'default_value', '')
+        for a in actions
         if a.kind == 'DeclareLaunchArgument'
     } | given
     for action in list(actions):
@@ -87,15 +90,21 @@ def test_the_fleet_launch_file_and_the_run_command_start_the_same(processes, mon
     valves = read_fleet(SHARE / 'config' / 'fleet.yaml')
     path = SHARE / 'launch' / 'fleet.launch.py'
     launched = [
-        (getattr(node, 'namespace', ''), node.executable,
-         node.arguments if node.executable == 'monitors' else [])
+        (
+            getattr(node, 'namespace', ''),
+            node.executable,
+            node.arguments if node.executable == 'monitors' else [],
+        )
         for node in described(path, monkeypatch, processes=str(processes))
         if node.kind == 'Node' and node.executable not in ('recorder', 'dashboard')
     ]
     options = argparse.Namespace(record=None, dashboard=False, simulate=True, processes=processes)
     ran = [
-        (task.label.rpartition('/')[0], task.executable,
-         task.arguments if task.executable == 'monitors' else [])
+        (
+            task.label.rpartition('/')[0],
+            task.executable,
+            task.arguments if task.executable == 'monitors' else [],
+        )
         for task in tasks_of(valves, options)
     ]
     assert sorted(launched) == sorted(ran)
@@ -109,7 +118,8 @@ def test_nodes_of_one_process_share_its_enclave():
         for enclave in policy(valves, processes=2).getroot().iter('enclave')
     }
     assert enclaves['/monitors_1'] == {
-        (f'/{valve}', node) for valve in ('lv1', 'lv3') for node in ('estimator', 'detector')}
+        (f'/{valve}', node) for valve in ('lv1', 'lv3') for node in ('estimator', 'detector')
+    }
     assert enclaves['/lv1/driver'] == {('/lv1', 'driver')}
     assert not {'/lv1/detector', '/lv2/estimator'} & set(enclaves)
 
@@ -118,16 +128,24 @@ def test_nodes_of_one_process_share_its_enclave():
 def test_the_parameter_file_is_taken_by_the_node(name, tmp_path):
     """A wrong parameter beside the file is the only complaint."""
     wrong = [*parameters(no_such='x'), '--params-file', str(SHARE / 'config/valve.param.yaml')]
-    done = subprocess.run([executable('damadics_fd', name), *wrong], capture_output=True,
-                          text=True, timeout=60)
+    done = subprocess.run(
+        [executable('damadics_fd', name), *wrong], capture_output=True, text=True, timeout=60
+    )
     assert done.returncode == 1
     complaints = [line for line in done.stderr.splitlines() if line.startswith('  ')]
     assert complaints == ['  no_such: there is no such parameter']
 
 
 def test_replay_takes_the_arguments_that_launch_adds(tmp_path):
-    command = [executable('damadics_fd', 'replay'), str(tmp_path / 'none.mcap'), '--live',
-               '--inputs-only', '--ros-args', '--enclave', '/replay']
+    command = [
+        executable('damadics_fd', 'replay'),
+        str(tmp_path / 'none.mcap'),
+        '--live',
+        '--inputs-only',
+        '--ros-args',
+        '--enclave',
+        '/replay',
+    ]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert 'unrecognized arguments' not in done.stderr
     assert 'none.mcap' in done.stderr
@@ -135,16 +153,29 @@ def test_replay_takes_the_arguments_that_launch_adds(tmp_path):
 
 def test_all_mistakes_in_a_fleet_are_listed(tmp_path):
     path = tmp_path / 'fleet.yaml'
-    path.write_text(yaml.safe_dump({'valves': {
-        'LV 1': {}, 'lv2': {'parameter': 'x'}, 'lv3': {'parameters': 'none.yaml'},
-        'lv4': {'topics': {'measurment': '/x'}}, 'lv5': {'settings': {'reference': 'r'}},
-        'lv6': {'settings': {'reference': 'r'}},
-    }}))
+    path.write_text(
+        yaml.safe_dump(
+            {
+                'valves': {
+                    'LV 1': {},
+                    'lv2': {'parameter': 'x'},
+                    'lv3': {'parameters': 'none.yaml'},
+                    'lv4': {'topics': {'measurment': '/x'}},
+                    'lv5': {'settings': {'reference': 'r'}},
+                    'lv6': {'settings': {'reference': 'r'}},
+                }
+            }
+        )
+    )
     with pytest.raises(FleetError) as caught:
         read_fleet(path)
-    for cause in ('LV 1: a name consists', 'lv2: there is no entry parameter',
-                  'none.yaml does not', 'lv4: there is no topic measurment',
-                  'lv6: lv5 has the reference r too'):
+    for cause in (
+        'LV 1: a name consists',
+        'lv2: there is no entry parameter',
+        'none.yaml does not',
+        'lv4: there is no topic measurment',
+        'lv6: lv5 has the reference r too',
+    ):
         assert cause in str(caught.value)
     for text in ('', 'valves: []', 'valves: {a: [1]}', ': :'):
         path.write_text(text)
@@ -153,8 +184,13 @@ def test_all_mistakes_in_a_fleet_are_listed(tmp_path):
 
 
 def fields(topic: str) -> set[str]:
-    kinds = {'measurement': msg.Measurement, 'estimate': msg.Estimate, 'residual':
-             msg.Float64Stamped, 'threshold': msg.Float64Stamped, 'fault_flag': msg.FaultFlag}
+    kinds = {
+        'measurement': msg.Measurement,
+        'estimate': msg.Estimate,
+        'residual': msg.Float64Stamped,
+        'threshold': msg.Float64Stamped,
+        'fault_flag': msg.FaultFlag,
+    }
     return set(kinds[topic].get_fields_and_field_types())
 
 
@@ -169,12 +205,20 @@ def test_the_layouts_name_topics_and_fields_that_exist():
     # as plotjuggler-ros-plugins reads it; curves of other topics would stay empty
     plugin = ET.parse(juggler).find('Plugins/plugin[@ID="ROS2 Topic Subscriber"]')
     taken = set(plugin.find('selected_topics').get('value').split(';'))
-    curves = [e.get(k) for e in ET.parse(juggler).iter('curve')
-              for k in ('name', 'curve_x', 'curve_y') if (e.get(k) or '').startswith('/')]
+    curves = [
+        e.get(k)
+        for e in ET.parse(juggler).iter('curve')
+        for k in ('name', 'curve_x', 'curve_y')
+        if (e.get(k) or '').startswith('/')
+    ]
     assert {curve.rpartition('/')[0] for curve in curves} <= taken
     panels = json.loads(foxglove)['configById']
     assert {name.partition('!')[0] for name in panels} == {
-        'Plot', 'StateTransitions', 'RawMessages', 'DiagnosticSummary'}
+        'Plot',
+        'StateTransitions',
+        'RawMessages',
+        'DiagnosticSummary',
+    }
     assert all(name in json.dumps(json.loads(foxglove)['layout']) for name in panels)
     for topic, field in named:
         assert field in fields(topic), f'{topic}.{field}'
@@ -189,8 +233,13 @@ def secured(tmp_path_factory):
         del valve['parameters']
     fleet['valves']['fv203']['topics'] = {'measurement': '/plc/fv203'}
     (folder / 'fleet.yaml').write_text(yaml.safe_dump(fleet))
-    command = [executable('damadics_bringup', 'policy'), str(folder / 'fleet.yaml'), '--simulate',
-               '--out', str(folder / 'policy.xml')]
+    command = [
+        executable('damadics_bringup', 'policy'),
+        str(folder / 'fleet.yaml'),
+        '--simulate',
+        '--out',
+        str(folder / 'policy.xml'),
+    ]
     subprocess.run(command, check=True, timeout=60)
     return folder / 'policy.xml'
 
@@ -232,10 +281,17 @@ def test_the_policy_has_what_ros2_security_reads(secured):
 
 
 def test_without_keys_an_enforced_node_does_not_start(tmp_path):
-    enforced = {'ROS_SECURITY_ENABLE': 'true', 'ROS_SECURITY_STRATEGY': 'Enforce',
-                'ROS_SECURITY_KEYSTORE': str(tmp_path / 'none')}
+    enforced = {
+        'ROS_SECURITY_ENABLE': 'true',
+        'ROS_SECURITY_STRATEGY': 'Enforce',
+        'ROS_SECURITY_KEYSTORE': str(tmp_path / 'none'),
+    }
     done = subprocess.run(
         [executable('damadics_fd', 'detector'), *parameters(mode='paper')],
-        env={**os.environ, **enforced}, capture_output=True, text=True, timeout=60)
+        env={**os.environ, **enforced},
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
     assert done.returncode != 0
     assert 'security' in done.stderr.lower() or 'keystore' in done.stderr.lower()

@@ -80,11 +80,11 @@ class Valve:
         status = self.report(node)
         return status is not None and text in status.message
 
-
     def calm(self) -> None:
         """Bring the valve to health, whatever the test before has left."""
-        assert self.run_until(lambda: self.flags[-1].state in (
-            FaultFlag.STATE_HEALTHY, FaultFlag.STATE_LATCHED))
+        assert self.run_until(
+            lambda: self.flags[-1].state in (FaultFlag.STATE_HEALTHY, FaultFlag.STATE_LATCHED)
+        )
         if self.flags[-1].state == FaultFlag.STATE_LATCHED:
             assert self.call(ResetAlarm, 'reset').success
         assert self.run_until(lambda: self.flags[-1].state == FaultFlag.STATE_HEALTHY)
@@ -111,7 +111,8 @@ def plant(tmp_path_factory):
         with Processes(folder / 'logs', surroundings(domain)) as processes:
             alarms = str(folder / 'alarms')
             yield SimpleNamespace(
-                valve=start(processes, peer, alarms), processes=processes, alarms=alarms)
+                valve=start(processes, peer, alarms), processes=processes, alarms=alarms
+            )
         peer.close()
 
 
@@ -170,7 +171,8 @@ def test_a_killed_detector_comes_back_with_its_alarm_and_raises_no_other(valve, 
     plant.processes.kill('detector')
     before = len(valve.flags)
     plant.processes.start(
-        'damadics_fd', 'detector', parameters(alarm_folder=plant.alarms, **SETTINGS))
+        'damadics_fd', 'detector', parameters(alarm_folder=plant.alarms, **SETTINGS)
+    )
     assert valve.run_until(lambda: len(valve.flags) > before, patience=30.0)
     assert valve.flags[before].fault, 'the alarm was lost'
     assert valve.run_until(
@@ -205,7 +207,9 @@ def test_a_second_publisher_on_measurement_is_reported(valve):
 def test_a_second_detector_of_the_same_valve_gives_way(valve, plant):
     second = subprocess.run(
         [executable('damadics_fd', 'detector'), *parameters(**SETTINGS)],
-        capture_output=True, text=True, timeout=60,
+        capture_output=True,
+        text=True,
+        timeout=60,
     )
     assert second.returncode == 1
     assert 'another detector sends on /fault_flag' in second.stderr
@@ -213,8 +217,9 @@ def test_a_second_detector_of_the_same_valve_gives_way(valve, plant):
 
 
 def set_parameter(valve: Valve, node: str, name: str, value: float):
-    given = Parameter(name=name, value=ParameterValue(
-        type=ParameterType.PARAMETER_DOUBLE, double_value=value))
+    given = Parameter(
+        name=name, value=ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=value)
+    )
     return valve.call(SetParameters, f'{node}/set_parameters', parameters=[given]).results[0]
 
 
@@ -243,8 +248,11 @@ def test_a_publisher_with_another_quality_of_service_is_named(processes, peer):
     peer.publisher = peer.node.create_publisher(Measurement, 'measurement', unreliable)
     valve = start(processes, peer)
     assert valve.run_until(
-        lambda: 'incompatible quality of service (reliability)' in processes.log(
-            'estimator').read_text())
+        lambda: (
+            'incompatible quality of service (reliability)'
+            in processes.log('estimator').read_text()
+        )
+    )
     assert valve.run_until(lambda: valve.says('estimator', 'no measurement'))
     assert valve.report('estimator').level == b'\x02'
     assert valve.flags[-1].state == FaultFlag.STATE_NOT_MONITORING
@@ -292,8 +300,14 @@ def test_a_sample_a_second_is_no_silence_in_mode_scada(processes, peer):
     for name in ('estimator', 'detector'):
         processes.start('damadics_fd', name, parameters(mode='scada'))
     flags = peer.listen(FaultFlag, 'fault_flag', qos.FLAG)
-    assert peer.wait(lambda: flags and peer.node.count_subscribers('/measurement')
-                     and peer.node.count_publishers('/estimate'), 60.0)
+    assert peer.wait(
+        lambda: (
+            flags
+            and peer.node.count_subscribers('/measurement')
+            and peer.node.count_publishers('/estimate')
+        ),
+        60.0,
+    )
     peer.wait(lambda: False, 1.0)
     for n in range(1, 6):
         peer.send(n * second, 0.5, 0.5)
@@ -310,26 +324,39 @@ def test_the_policy_of_a_fleet_allows_all_that_its_nodes_make(processes, peer):
     fleet = [FleetEntry('lv101')]
     for node in ('estimator', 'detector'):
         processes.start('damadics_fd', node, arguments_of({}, namespace='lv101'))
-    processes.start('damadics_plant', 'plant', arguments_of(
-        {'rate': 50.0, 'publish_clock': True}, namespace='lv101'))
+    processes.start(
+        'damadics_plant',
+        'plant',
+        arguments_of({'rate': 50.0, 'publish_clock': True}, namespace='lv101'),
+    )
     graph = peer.node
     services = ('/lv101/relearn', '/lv101/reset', '/lv101/inject_fault')
-    assert peer.wait(lambda: set(services) <= {
-        name for name, _ in graph.get_service_names_and_types()}, 60.0)
-    assert peer.wait(lambda: graph.count_publishers('/lv101/estimate')
-                     and graph.count_subscribers('/lv101/estimate'), 30.0)
+    assert peer.wait(
+        lambda: set(services) <= {name for name, _ in graph.get_service_names_and_types()}, 60.0
+    )
+    assert peer.wait(
+        lambda: (
+            graph.count_publishers('/lv101/estimate')
+            and graph.count_subscribers('/lv101/estimate')
+        ),
+        30.0,
+    )
     nodes = {(name, '/lv101') for name in ('estimator', 'detector', 'plant')}
     assert peer.wait(lambda: nodes <= set(graph.get_node_names_and_namespaces()), 30.0)
-    asks = {'publish': graph.get_publisher_names_and_types_by_node,
-            'subscribe': graph.get_subscriber_names_and_types_by_node,
-            'reply': graph.get_service_names_and_types_by_node}
+    asks = {
+        'publish': graph.get_publisher_names_and_types_by_node,
+        'subscribe': graph.get_subscriber_names_and_types_by_node,
+        'reply': graph.get_service_names_and_types_by_node,
+    }
     for profile in policy(fleet, simulate=True).getroot().iter('profile'):
         name, namespace = profile.get('node'), profile.get('ns')
         if namespace != '/lv101' or name == 'driver':
             continue
         for verb, ask in asks.items():
             made = {topic for topic, _ in ask(name, namespace)}
-            allowed = {element.text.replace('~', f'/lv101/{name}', 1)
-                       for element in profile.findall(f'*[@{verb}]/*')}
+            allowed = {
+                element.text.replace('~', f'/lv101/{name}', 1)
+                for element in profile.findall(f'*[@{verb}]/*')
+            }
             assert made <= allowed, f'{name} may not {verb} {made - allowed}'
             assert made or verb != 'reply'

@@ -40,11 +40,15 @@ def at_scada_rate(scenario: str) -> dict[str, np.ndarray]:
     return {name: np.asarray(columns[name]) for name in ('stamp', *SIGNALS)}
 
 
-@pytest.mark.parametrize(('mode', 'source', 'speeds', 'changes'), [
-    ('paper', lambda: excerpt('dablib_spring', 66.0, 74.0), (2, 8), {}),
-    ('monitor', lambda: excerpt('lugre_spring', 52.0, 72.0), (4,), QUICK),
-    ('scada', lambda: at_scada_rate('f16_B'), (150,), {}),
-], ids=['paper', 'monitor', 'scada'])
+@pytest.mark.parametrize(
+    ('mode', 'source', 'speeds', 'changes'),
+    [
+        ('paper', lambda: excerpt('dablib_spring', 66.0, 74.0), (2, 8), {}),
+        ('monitor', lambda: excerpt('lugre_spring', 52.0, 72.0), (4,), QUICK),
+        ('scada', lambda: at_scada_rate('f16_B'), (150,), {}),
+    ],
+    ids=['paper', 'monitor', 'scada'],
+)
 def test_live_and_offline_agree_bit_for_bit(tmp_path, mode, source, speeds, changes):
     columns = source()
     source = tmp_path / 'source.mcap'
@@ -92,9 +96,17 @@ def played(source: Path, folder: Path, mode: str, speed: int, changes: dict) -> 
         for node in ('detector', 'estimator'):
             processes.start('damadics_fd', node, parameters(mode=mode, **changes))
         wait_for_chain(domain, processes)
-        processes.start('damadics_fd', 'replay', [
-            str(source), '--live', '--inputs-only', '--rate', str(speed),
-        ])
+        processes.start(
+            'damadics_fd',
+            'replay',
+            [
+                str(source),
+                '--live',
+                '--inputs-only',
+                '--rate',
+                str(speed),
+            ],
+        )
         wait_for_end(processes, 'replay')
         processes.check()
         for node in ('estimator', 'detector', 'recorder'):

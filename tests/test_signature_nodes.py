@@ -40,9 +40,14 @@ def chain(processes, peer):
 
 def await_chain(peer):
     graph = peer.node
-    assert peer.wait(lambda: graph.count_subscribers('/estimate') == 1
-                     and graph.count_subscribers('/measurement') == 1
-                     and graph.count_publishers('/signature') == 1, 60.0), 'no node started'
+    assert peer.wait(
+        lambda: (
+            graph.count_subscribers('/estimate') == 1
+            and graph.count_subscribers('/measurement') == 1
+            and graph.count_publishers('/signature') == 1
+        ),
+        60.0,
+    ), 'no node started'
     peer.wait(lambda: False, 0.5)
 
 
@@ -64,9 +69,19 @@ def test_a_fault_of_the_running_plant_gets_its_cause_and_replay_says_the_same(ch
     measured = chain.listen(Measurement, 'measurement', qos.SAMPLES)
     flags = chain.listen(FaultFlag, 'fault_flag', qos.FLAG)
     events = chain.listen(FaultEvent, 'fault_event', qos.EVENTS)
-    processes.start('damadics_plant', 'plant', parameters(
-        scenario='random_spring', model='lugre', noise=True, rate=RATE, duration=120.0,
-        real_time_factor=8.0, wait_for_subscribers=2))
+    processes.start(
+        'damadics_plant',
+        'plant',
+        parameters(
+            scenario='random_spring',
+            model='lugre',
+            noise=True,
+            rate=RATE,
+            duration=120.0,
+            real_time_factor=8.0,
+            wait_for_subscribers=2,
+        ),
+    )
     signatures = chain.got['signature']
     assert chain.wait(lambda: signatures and stamp_of(signatures[-1]) > 118e9, 100.0)
     last = signatures[-1]
@@ -97,8 +112,12 @@ def restart(peer, processes, *names):
     for name in names:
         processes.end(name)
     graph = peer.node
-    assert peer.wait(lambda: graph.count_publishers('/signature') == 0
-                     and ('estimator' not in names or graph.count_publishers('/estimate') == 0))
+    assert peer.wait(
+        lambda: (
+            graph.count_publishers('/signature') == 0
+            and ('estimator' not in names or graph.count_publishers('/estimate') == 0)
+        )
+    )
     peer.got['signature'].clear()
     for name in names:
         processes.start('damadics_fd', name, parameters(**QUICK))
@@ -107,8 +126,9 @@ def restart(peer, processes, *names):
 
 
 def test_a_restarted_detector_explains_a_fault_at_once(chain, processes):
-    columns = simulate('random_spring', rate=RATE, model='lugre', duration=110.0, noise=True,
-                       seed=3)
+    columns = simulate(
+        'random_spring', rate=RATE, model='lugre', duration=110.0, noise=True, seed=3
+    )
     early = columns['stamp'] < 65e9
     send(chain, {name: columns[name][early] for name in ('stamp', *SIGNALS)})
     signatures = chain.got['signature']
@@ -135,8 +155,12 @@ ACTUATOR = 'LV-101'
 
 def store_history(folder, learned) -> TrendFile:
     """Keep a reference and a trend of 20 days before NOW that leads to where the valve is now."""
-    save_reference(folder / f'{ACTUATOR}.signature', Reference(
-        ACTUATOR, {}, SETTINGS.to_dict(), learned, source='live', last_stamp=NOW - 10**9))
+    save_reference(
+        folder / f'{ACTUATOR}.signature',
+        Reference(
+            ACTUATOR, {}, SETTINGS.to_dict(), learned, source='live', last_stamp=NOW - 10**9
+        ),
+    )
     trend = TrendFile(folder, ACTUATOR, series_name(learned))
     rng = np.random.default_rng(8)
     for days in np.linspace(-20.0, -0.02, 80):
@@ -146,10 +170,13 @@ def store_history(folder, learned) -> TrendFile:
 
 
 def test_a_stored_trend_is_published_with_its_band_and_the_time_to_its_limit(
-    processes, peer, tmp_path,
+    processes,
+    peer,
+    tmp_path,
 ):
-    columns = simulate('random_spring', rate=RATE, model='lugre', duration=68.0, noise=True,
-                       seed=3)  # its fault comes after 70 s
+    columns = simulate(
+        'random_spring', rate=RATE, model='lugre', duration=68.0, noise=True, seed=3
+    )  # its fault comes after 70 s
     learned = run(columns, SETTINGS).detector.signature.save()
     trend = store_history(tmp_path / 'signature', learned)
     before = trend.path.read_text().count('\n')
@@ -157,8 +184,11 @@ def test_a_stored_trend_is_published_with_its_band_and_the_time_to_its_limit(
     reports = peer.listen(DiagnosticArray, '/diagnostics', qos.DIAGNOSTICS)
     peer.listen(Float64Stamped, 'threshold', qos.SAMPLES)
     processes.start('damadics_fd', 'estimator', parameters(**QUICK, actuator=ACTUATOR))
-    processes.start('damadics_fd', 'detector', parameters(
-        **QUICK, actuator=ACTUATOR, signature_folder=str(trend.path.parent)))
+    processes.start(
+        'damadics_fd',
+        'detector',
+        parameters(**QUICK, actuator=ACTUATOR, signature_folder=str(trend.path.parent)),
+    )
     await_chain(peer)
     send(peer, dict(columns) | {'stamp': columns['stamp'] + NOW})
     first, last = signatures[0], signatures[-1]
@@ -168,8 +198,14 @@ def test_a_stored_trend_is_published_with_its_band_and_the_time_to_its_limit(
         # the slope of 80 points over 20 days has 1/52 of their deviation per day
         assert np.all(np.abs(np.subtract(message.trend, SLOPES)) < np.multiply(DEVIATIONS, 4 / 52))
         assert message.limit[0] == -0.1 and message.limit[2] == 3.0
-        expected, earliest, latest = (np.array(values) / DAY for values in (
-            message.time_to_limit, message.time_to_limit_earliest, message.time_to_limit_latest))
+        expected, earliest, latest = (
+            np.array(values) / DAY
+            for values in (
+                message.time_to_limit,
+                message.time_to_limit_earliest,
+                message.time_to_limit_latest,
+            )
+        )
         assert expected[0] == pytest.approx(100.0, rel=0.05)
         assert expected[2] == pytest.approx(60.0, rel=0.05)
         for k in (0, 2):

@@ -16,8 +16,15 @@ from typing import Any
 
 PICTURES = os.environ.get('DAMADICS_SCREENSHOTS')  # folder to write pictures of the page to
 CHROMIUM = Path('/usr/bin/chromium')
-FLAGS = ['--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run', '--disable-sync',
-         '--disable-background-networking', '--disable-component-update']
+FLAGS = [
+    '--no-sandbox',
+    '--disable-gpu',
+    '--disable-quic',
+    '--no-first-run',
+    '--disable-sync',
+    '--disable-background-networking',
+    '--disable-component-update',
+]
 ALARM = ('M', 'S', 'F')  # classes of NE 107 that a tile with an alarm shows
 # learn in seconds what takes a minute in earnest
 LEARN_QUICKLY = {'t_on': 1.0, 't_w': 3.0, 't_learn': 8.0, 'travel_min': 0.1}
@@ -82,7 +89,8 @@ class Tile:
         """Return ok, learn, off, M, S, C or F; nothing while there is no tile."""
         if self._page:
             return self._page.evaluate(
-                f"document.querySelector('[data-valve={self._valve}]')?.dataset.kind || ''")
+                f"document.querySelector('[data-valve={self._valve}]')?.dataset.kind || ''"
+            )
         with urllib.request.urlopen(self._address, timeout=5.0) as answer:
             text = unescape(answer.read().decode()).replace('\\"', '"')
         found = re.search(rf'data-valve="{self._valve}" data-kind="(\w+)"', text)

@@ -24,9 +24,11 @@ setup(
     description='Launch files, parameter files, layouts and the demonstration of DAMADICS FD.',
     license='Apache-2.0',
     extras_require={'test': ['pytest']},
-    entry_points={'console_scripts': [
-        'demo = damadics_bringup.demo:main',
-        'policy = damadics_bringup.policy:main',
-        'run = damadics_bringup.launcher:main',
-    ]},
+    entry_points={
+        'console_scripts': [
+            'demo = damadics_bringup.demo:main',
+            'policy = damadics_bringup.policy:main',
+            'run = damadics_bringup.launcher:main',
+        ]
+    },
 )

@@ -52,30 +52,46 @@ def main(args: list[str] | None = None) -> int:
 def parser() -> argparse.ArgumentParser:
     """Describe the command line."""
     top = argparse.ArgumentParser(
-        prog='demo', description="The paper's friction and spring experiment through plant, "
+        prog='demo',
+        description="The paper's friction and spring experiment through plant, "
         'estimator, detector and recorder as real processes; then the recorded bags through '
-        'the same core off line.', epilog='Example: ros2 run damadics_bringup demo --factor 5')
-    top.add_argument('--out', type=Path, default=Path('demo'), metavar='DIR',
-                     help='folder for bags, figures and results.json (default: demo)')
-    top.add_argument('--factor', type=float, default=8.0,
-                     help='seconds of scenario per second of wall time (default: 8)')
-    top.add_argument('--only', choices=[e.name for e in EXPERIMENTS],
-                     help='do this experiment only')
+        'the same core off line.',
+        epilog='Example: ros2 run damadics_bringup demo --factor 5',
+    )
+    top.add_argument(
+        '--out',
+        type=Path,
+        default=Path('demo'),
+        metavar='DIR',
+        help='folder for bags, figures and results.json (default: demo)',
+    )
+    top.add_argument(
+        '--factor',
+        type=float,
+        default=8.0,
+        help='seconds of scenario per second of wall time (default: 8)',
+    )
+    top.add_argument(
+        '--only', choices=[e.name for e in EXPERIMENTS], help='do this experiment only'
+    )
     return top
 
 
-def _perform(
-    experiment: Experiment, options: argparse.Namespace, console: Console
-) -> Outcome:
+def _perform(experiment: Experiment, options: argparse.Namespace, console: Console) -> Outcome:
     folder = options.out / experiment.name
     columns = (
-        TextColumn(f'{experiment.title:<42}'), BarColumn(), TextColumn('{task.percentage:3.0f} %'),
-        TextColumn('{task.fields[note]}'), TimeElapsedColumn(),
+        TextColumn(f'{experiment.title:<42}'),
+        BarColumn(),
+        TextColumn('{task.percentage:3.0f} %'),
+        TextColumn('{task.fields[note]}'),
+        TimeElapsedColumn(),
     )
     with Progress(*columns, console=console) as progress:
         task = progress.add_task('', total=SECONDS, note='starting the nodes')
         bag = live_run.run(
-            experiment.scenario, folder, factor=options.factor,
+            experiment.scenario,
+            folder,
+            factor=options.factor,
             on_time=lambda t: progress.update(task, completed=t, note=f't = {t:5.1f} s'),
         )
         progress.update(task, completed=SECONDS, note='replaying the bag')

@@ -11,8 +11,15 @@ from typing import Any
 import yaml
 
 NAME = re.compile(r'[a-z][a-z0-9_]*(/[a-z][a-z0-9_]*)*')
-TOPICS = ('measurement', 'fault_state', 'estimate', 'residual', 'threshold', 'fault_flag',
-          'fault_event')
+TOPICS = (
+    'measurement',
+    'fault_state',
+    'estimate',
+    'residual',
+    'threshold',
+    'fault_flag',
+    'fault_event',
+)
 ENTRIES = {'parameters': str, 'settings': dict, 'topics': dict, 'simulate': dict}
 MONITORS = ('estimator', 'detector')  # nodes of every valve
 OF_NODE = {'reference': 'estimator', 'alarm_folder': 'detector'}  # the rest is of both
@@ -39,8 +46,9 @@ class Valve:
         :param node: `estimator` or `detector`.
         :return: parameters by name.
         """
-        return {name: value for name, value in self.settings.items()
-                if OF_NODE.get(name, node) == node}
+        return {
+            name: value for name, value in self.settings.items() if OF_NODE.get(name, node) == node
+        }
 
 
 def read_fleet(path: Path | str) -> list[Valve]:
@@ -60,8 +68,9 @@ def read_fleet(path: Path | str) -> list[Valve]:
         raise FleetError(f'{path}: {problem}') from problem
     entries = content.get('valves') if isinstance(content, dict) else None
     if not isinstance(entries, dict) or not entries:
-        raise FleetError(f'{path}: there is no entry "valves" with a name and settings for each '
-                         'valve')
+        raise FleetError(
+            f'{path}: there is no entry "valves" with a name and settings for each valve'
+        )
     problems: list[str] = []
     valves = [_valve(path, str(name), entry or {}, problems) for name, entry in entries.items()]
     problems += _shared(valves)

@@ -38,8 +38,14 @@ class Task(NamedTuple):
     arguments: list[str]
 
 
-def arguments_of(parameters: dict[str, Any], *, namespace: str = '', file: Path | None = None,
-                 topics: dict[str, str] | None = None, enclave: str = '') -> list[str]:
+def arguments_of(
+    parameters: dict[str, Any],
+    *,
+    namespace: str = '',
+    file: Path | None = None,
+    topics: dict[str, str] | None = None,
+    enclave: str = '',
+) -> list[str]:
     """
     Write a node's command line.
 
@@ -75,26 +81,57 @@ def tasks_of(valves: list[Valve], options: argparse.Namespace) -> list[Task]:
     """
     tasks = []
     if options.record:
-        tasks.append(Task('recorder', 'damadics_fd', 'recorder',
-                          ['--all', '--out', str(options.record), *arguments_of(
-                              {}, enclave='/recorder')]))
-    tasks += _together(valves, options.processes) if options.processes else [
-        Task(f'{valve.name}/{node}', 'damadics_fd', node,
-             node_arguments(valve, node, f'/{valve.name}/{node}'))
-        for valve in valves for node in MONITORS
-    ]
+        tasks.append(
+            Task(
+                'recorder',
+                'damadics_fd',
+                'recorder',
+                ['--all', '--out', str(options.record), *arguments_of({}, enclave='/recorder')],
+            )
+        )
+    tasks += (
+        _together(valves, options.processes)
+        if options.processes
+        else [
+            Task(
+                f'{valve.name}/{node}',
+                'damadics_fd',
+                node,
+                node_arguments(valve, node, f'/{valve.name}/{node}'),
+            )
+            for valve in valves
+            for node in MONITORS
+        ]
+    )
     if options.dashboard:
-        tasks.append(Task('dashboard', 'damadics_dashboard', 'dashboard',
-                          ['--port', str(options.port), '--host', options.host]
-                          + (['--show'] if options.show else [])
-                          + arguments_of({}, enclave='/dashboard')))
+        tasks.append(
+            Task(
+                'dashboard',
+                'damadics_dashboard',
+                'dashboard',
+                ['--port', str(options.port), '--host', options.host]
+                + (['--show'] if options.show else [])
+                + arguments_of({}, enclave='/dashboard'),
+            )
+        )
     if options.simulate:
         tasks += [
-            Task(f'{valve.name}/plant', 'damadics_plant', 'plant', arguments_of(
-                {'duration': FOREVER, 'wait_for_subscribers': 1 + bool(options.record),
-                 'actuator': valve.settings.get('actuator', valve.name), **valve.simulate},
-                namespace=valve.name, topics=dict(valve.topics),
-                enclave=f'/{valve.name}/plant'))
+            Task(
+                f'{valve.name}/plant',
+                'damadics_plant',
+                'plant',
+                arguments_of(
+                    {
+                        'duration': FOREVER,
+                        'wait_for_subscribers': 1 + bool(options.record),
+                        'actuator': valve.settings.get('actuator', valve.name),
+                        **valve.simulate,
+                    },
+                    namespace=valve.name,
+                    topics=dict(valve.topics),
+                    enclave=f'/{valve.name}/plant',
+                ),
+            )
             for valve in valves
         ]
     return tasks
@@ -109,8 +146,13 @@ def node_arguments(valve: Valve, node: str, enclave: str) -> list[str]:
     :param enclave: of SROS 2.
     :return: arguments.
     """
-    return arguments_of(valve.settings_of(node), namespace=valve.name, file=valve.parameters,
-                        topics=dict(valve.topics), enclave=enclave)
+    return arguments_of(
+        valve.settings_of(node),
+        namespace=valve.name,
+        file=valve.parameters,
+        topics=dict(valve.topics),
+        enclave=enclave,
+    )
 
 
 def arguments_of_all(valves: list[Valve], enclave: str) -> list[str]:
@@ -129,8 +171,10 @@ def arguments_of_all(valves: list[Valve], enclave: str) -> list[str]:
 
 
 def _together(valves: list[Valve], processes: int) -> list[Task]:
-    return [Task(name, 'damadics_fd', 'monitors', arguments_of_all(group, f'/{name}'))
-            for name, group in spread(valves, processes).items()]
+    return [
+        Task(name, 'damadics_fd', 'monitors', arguments_of_all(group, f'/{name}'))
+        for name, group in spread(valves, processes).items()
+    ]
 
 
 class Keeper:
@@ -166,8 +210,12 @@ class Keeper:
                 self._due[label] = now + pause
                 log = self._processes.log(label)
                 words = log.read_text(errors='replace').strip().splitlines()[-1:]
-                print(f'{label} ended with exit code {code}, again in {pause:g} s: '
-                      f'{words[0] if words else "no words"} ({log})', file=sys.stderr, flush=True)
+                print(
+                    f'{label} ended with exit code {code}, again in {pause:g} s: '
+                    f'{words[0] if words else "no words"} ({log})',
+                    file=sys.stderr,
+                    flush=True,
+                )
 
     def _start(self, label: str) -> None:
         task = self._tasks[label]
@@ -181,21 +229,36 @@ def parser() -> argparse.ArgumentParser:
 
     :return: its parser.
     """
-    p = command_parser('run', 'Start estimator and detector of every valve and keep them '
-                       'running.', EXAMPLES)
-    p.add_argument('fleet', nargs='?', type=Path,
-                   help='list of the valves (YAML); default: one valve for a first look')
+    p = command_parser(
+        'run', 'Start estimator and detector of every valve and keep them running.', EXAMPLES
+    )
+    p.add_argument(
+        'fleet',
+        nargs='?',
+        type=Path,
+        help='list of the valves (YAML); default: one valve for a first look',
+    )
     p.add_argument('--simulate', action='store_true', help='start a simulated plant per valve')
     p.add_argument('--dashboard', action='store_true', help='start the web page')
     p.add_argument('--show', action='store_true', help='open the web page in a browser')
     p.add_argument('--host', default='127.0.0.1', help='address of the web page (127.0.0.1)')
     p.add_argument('--port', type=int, default=8080, help='port of the web page (8080)')
     p.add_argument('--record', type=Path, metavar='DIR', help='record all topics into this bag')
-    p.add_argument('--processes', type=int, default=0, metavar='N',
-                   help='run all estimators and detectors in N processes, at most half the cost '
-                   'of one process each (the default)')
-    p.add_argument('--logs', type=Path, default=state_folder() / 'logs', metavar='DIR',
-                   help='where the output of every process goes (%(default)s)')
+    p.add_argument(
+        '--processes',
+        type=int,
+        default=0,
+        metavar='N',
+        help='run all estimators and detectors in N processes, at most half the cost '
+        'of one process each (the default)',
+    )
+    p.add_argument(
+        '--logs',
+        type=Path,
+        default=state_folder() / 'logs',
+        metavar='DIR',
+        help='where the output of every process goes (%(default)s)',
+    )
     p.add_argument('--for', dest='seconds', type=float, metavar='S', help='end after so long [s]')
     return p
 
@@ -209,12 +272,16 @@ def greeting(valves: list[Valve], options: argparse.Namespace) -> str:
     :return: lines of text.
     """
     names = [valve.name for valve in valves[:NAMED]] + ['...'] * (len(valves) > NAMED)
-    lines = [f'{len(valves)} valve(s): {", ".join(names)}; logs in {options.logs}; '
-             'Ctrl-C ends all, a second one at once']
+    lines = [
+        f'{len(valves)} valve(s): {", ".join(names)}; logs in {options.logs}; '
+        'Ctrl-C ends all, a second one at once'
+    ]
     cores = os.cpu_count() or 1
     if not options.processes and len(valves) > cores:
-        lines.append(f'{2 * len(valves)} processes monitor them on {cores} cores: '
-                     f'--processes {cores} does it at half the cost')
+        lines.append(
+            f'{2 * len(valves)} processes monitor them on {cores} cores: '
+            f'--processes {cores} does it at half the cost'
+        )
     if options.dashboard:
         lines.append(f'The dashboard opens at http://{options.host}:{options.port}')
     return '\n'.join(lines)
@@ -236,8 +303,9 @@ def main(args: Sequence[str] | None = None) -> int:
     share = Path(get_package_share_directory('damadics_bringup'))
     try:
         if options.processes < 0:
-            raise FleetError('--processes: give a number of processes from 1, such as the cores '
-                             'of this machine')
+            raise FleetError(
+                '--processes: give a number of processes from 1, such as the cores of this machine'
+            )
         valves = read_fleet(options.fleet or share / 'config' / 'demo_valve.yaml')
         tasks = tasks_of(valves, options)
         with Processes(options.logs) as processes:

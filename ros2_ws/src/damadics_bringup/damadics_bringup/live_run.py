@@ -26,7 +26,11 @@ from damadics_bringup.processes import (
 )
 
 CHAIN = {  # the number of subscribers of each topic before the plant starts
-    '/estimate': 2, '/residual': 1, '/threshold': 1, '/fault_flag': 2, '/fault_event': 1,
+    '/estimate': 2,
+    '/residual': 1,
+    '/threshold': 1,
+    '/fault_flag': 2,
+    '/fault_event': 1,
 }
 PATIENCE = 30.0  # s for the processes to discover each other
 WRITING = 120.0  # s for the queues to empty, and for the recorder to write what it has
@@ -119,10 +123,14 @@ def run(
                 processes.start('damadics_fd', name, parameters(mode='paper'))
             _await_chain(watcher, processes)
             processes.start(
-                'damadics_plant', 'plant',
+                'damadics_plant',
+                'plant',
                 parameters(
-                    scenario=scenario, rate=400.0, real_time_factor=factor,
-                    publish_clock=True, wait_for_subscribers=2,
+                    scenario=scenario,
+                    rate=400.0,
+                    real_time_factor=factor,
+                    publish_clock=True,
+                    wait_for_subscribers=2,
                 ),
             )
             watcher.spin_until(lambda: processes.ended('plant'), PATIENCE + 3600.0)

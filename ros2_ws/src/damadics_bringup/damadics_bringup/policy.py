@@ -18,10 +18,22 @@ EXAMPLES = """example:
   ros2 security create_keystore keystore
   ros2 security generate_artifacts -k keystore -p policy.xml"""
 # what rclpy makes for every node: without the right to it, a node does not start
-EVERY_NODE = ('describe_parameters', 'get_parameter_types', 'get_parameters', 'list_parameters',
-              'set_parameters', 'set_parameters_atomically', 'get_type_description')
-LIFECYCLE = ('change_state', 'get_available_states', 'get_available_transitions', 'get_state',
-             'get_transition_graph')
+EVERY_NODE = (
+    'describe_parameters',
+    'get_parameter_types',
+    'get_parameters',
+    'list_parameters',
+    'set_parameters',
+    'set_parameters_atomically',
+    'get_type_description',
+)
+LIFECYCLE = (
+    'change_state',
+    'get_available_states',
+    'get_available_transitions',
+    'get_state',
+    'get_transition_graph',
+)
 SAMPLES = ('measurement', 'estimate', 'threshold', 'fault_flag', 'fault_event')
 ALL = (*SAMPLES, 'residual', 'signature', 'fault_state')
 OPERATE = ('acknowledge', 'reset', 'shelve', 'relearn', 'save_reference', 'load_reference')
@@ -39,19 +51,32 @@ class Rights:
 
 NODES = {  # of every valve
     'estimator': Rights(
-        ('estimate', '/diagnostics', '~/transition_event'), ('measurement',),
-        ('relearn', 'save_reference', 'load_reference', *(f'~/{name}' for name in LIFECYCLE))),
+        ('estimate', '/diagnostics', '~/transition_event'),
+        ('measurement',),
+        ('relearn', 'save_reference', 'load_reference', *(f'~/{name}' for name in LIFECYCLE)),
+    ),
     'detector': Rights(
-        ('residual', 'threshold', 'fault_flag', 'fault_event', 'signature', '/diagnostics',
-         '~/transition_event'), ('estimate', 'fault_flag'),
-        ('acknowledge', 'reset', 'shelve', *(f'~/{name}' for name in LIFECYCLE))),
+        (
+            'residual',
+            'threshold',
+            'fault_flag',
+            'fault_event',
+            'signature',
+            '/diagnostics',
+            '~/transition_event',
+        ),
+        ('estimate', 'fault_flag'),
+        ('acknowledge', 'reset', 'shelve', *(f'~/{name}' for name in LIFECYCLE)),
+    ),
     'driver': Rights(('measurement',)),  # of the plant: its name is for you to choose
 }
 PLANT = Rights(('measurement', 'fault_state', '/clock'), (), ('inject_fault',))
 
 
 def policy(
-    valves: Sequence[Valve], simulate: bool = False, processes: int = 0,
+    valves: Sequence[Valve],
+    simulate: bool = False,
+    processes: int = 0,
 ) -> ET.ElementTree:
     """
     Write down what each node of a fleet may do.
@@ -63,44 +88,67 @@ def policy(
     """
     root = ET.Element('policy', version='0.2.0')
     enclaves = ET.SubElement(root, 'enclaves')
-    process_of = {valve.name: name for name, group in spread(list(valves), processes).items()
-                  for valve in group}
+    process_of = {
+        valve.name: name
+        for name, group in spread(list(valves), processes).items()
+        for valve in group
+    }
     for valve in valves:
         for node, rights in {**NODES, **({'plant': PLANT} if simulate else {})}.items():
             shared = process_of.get(valve.name, '') if node in MONITORS else ''
             _enclave(enclaves, f'/{valve.name}', node, _of_valve(rights, valve), shared)
     operate = (*OPERATE, 'inject_fault') if simulate else OPERATE
     page = _all(valves, Rights((), SAMPLES, (), operate))
-    _enclave(enclaves, '/', 'dashboard', Rights(
-        (), (*page.subscribe, '/diagnostics'), (), page.request))
-    events = [f'/{v.name}/{node}/transition_event' for v in valves
-              for node in ('estimator', 'detector')]
-    _enclave(enclaves, '/', 'recorder', Rights(
-        ('/diagnostics',), (*_all(valves, Rights((), ALL)).subscribe, *(f'/{n}' for n in ALL),
-                            '/diagnostics', '/rosout', '/parameter_events', *events)))
+    _enclave(
+        enclaves, '/', 'dashboard', Rights((), (*page.subscribe, '/diagnostics'), (), page.request)
+    )
+    events = [
+        f'/{v.name}/{node}/transition_event' for v in valves for node in ('estimator', 'detector')
+    ]
+    _enclave(
+        enclaves,
+        '/',
+        'recorder',
+        Rights(
+            ('/diagnostics',),
+            (
+                *_all(valves, Rights((), ALL)).subscribe,
+                *(f'/{n}' for n in ALL),
+                '/diagnostics',
+                '/rosout',
+                '/parameter_events',
+                *events,
+            ),
+        ),
+    )
     ET.indent(root)
     return ET.ElementTree(root)
 
 
 def _of_valve(rights: Rights, valve: Valve) -> Rights:
     """Give names their full form, with the topics where they are on the plant."""
+
     def full(names: Iterable[str]) -> list[str]:
         named = (valve.topics.get(name, name) for name in names)
         return [name if name[0] in '/~' else f'/{valve.name}/{name}' for name in named]
 
-    return Rights(full(rights.publish), full(rights.subscribe), full(rights.reply),
-                  full(rights.request))
+    return Rights(
+        full(rights.publish), full(rights.subscribe), full(rights.reply), full(rights.request)
+    )
 
 
 def _all(valves: Iterable[Valve], rights: Rights) -> Rights:
     """Collect the rights in all valves."""
     each = [_of_valve(rights, valve) for valve in valves]
-    return Rights(subscribe=[name for one in each for name in one.subscribe],
-                  request=[name for one in each for name in one.request])
+    return Rights(
+        subscribe=[name for one in each for name in one.subscribe],
+        request=[name for one in each for name in one.request],
+    )
 
 
-def _enclave(enclaves: ET.Element, namespace: str, node: str, rights: Rights,
-             shared: str = '') -> None:
+def _enclave(
+    enclaves: ET.Element, namespace: str, node: str, rights: Rights, shared: str = ''
+) -> None:
     """Add a node's profile to its own enclave, or to the one of its process."""
     path = f'/{shared}' if shared else f'{namespace.rstrip("/")}/{node}'
     profiles = enclaves.find(f"enclave[@path='{path}']/profiles")
@@ -125,8 +173,9 @@ def parser() -> argparse.ArgumentParser:
 
     :return: its parser.
     """
-    p = command_parser('policy', 'Write the SROS 2 policy of a fleet: one enclave per node.',
-                       EXAMPLES)
+    p = command_parser(
+        'policy', 'Write the SROS 2 policy of a fleet: one enclave per node.', EXAMPLES
+    )
     p.add_argument('fleet', type=Path, help='list of the valves (YAML)')
     p.add_argument('--simulate', action='store_true', help='also for the simulated plants')
     p.add_argument('--processes', type=int, default=0, metavar='N', help='as given to run')

@@ -135,8 +135,12 @@ class Processes:
         """End what still runs."""
         self.end_all()
 
-    def end_all(self, patience: float = 10.0, patient_with: Mapping[str, float] | None = None,
-                hurry: Callable[[], bool] = lambda: False) -> list[str]:
+    def end_all(
+        self,
+        patience: float = 10.0,
+        patient_with: Mapping[str, float] | None = None,
+        hurry: Callable[[], bool] = lambda: False,
+    ) -> list[str]:
         """
         End all processes at the same time: SIGINT, and SIGKILL for what then still runs.
 
@@ -164,8 +168,9 @@ class Processes:
         """Start further processes without a variable of the environment."""
         self._environment.pop(variable, None)
 
-    def start(self, package: str, name: str, arguments: Sequence[str] = (),
-              label: str = '') -> None:
+    def start(
+        self, package: str, name: str, arguments: Sequence[str] = (), label: str = ''
+    ) -> None:
         """
         Start an executable.
 
@@ -179,7 +184,9 @@ class Processes:
         with self.log(label).open('ab') as log:
             self._running[label] = subprocess.Popen(
                 [executable(package, name), *arguments],
-                stdout=log, stderr=subprocess.STDOUT, env=self._environment,
+                stdout=log,
+                stderr=subprocess.STDOUT,
+                env=self._environment,
                 start_new_session=True,  # Ctrl-C reaches it through this process, and once only
             )
 

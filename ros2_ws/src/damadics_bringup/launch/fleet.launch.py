@@ -21,50 +21,98 @@ def valves(context):
     fleet = read_fleet(LaunchConfiguration('fleet').perform(context))
     together = spread(fleet, int(LaunchConfiguration('processes').perform(context)))
     actions = [
-        Node(package='damadics_fd', executable='monitors', respawn=True, respawn_delay=1.0,
-             arguments=arguments_of_all(group, f'/{name}'), output='screen')
+        Node(
+            package='damadics_fd',
+            executable='monitors',
+            respawn=True,
+            respawn_delay=1.0,
+            arguments=arguments_of_all(group, f'/{name}'),
+            output='screen',
+        )
         for name, group in together.items()
     ]
     for valve in fleet:
         file = [str(valve.parameters)] if valve.parameters else []
         topics = list(valve.topics.items())
         actions += [
-            Node(package='damadics_fd', executable=node, namespace=valve.name,
-                 parameters=[*file, valve.settings_of(node)], remappings=topics,
-                 ros_arguments=['--enclave', f'/{valve.name}/{node}'],
-                 respawn=True, respawn_delay=1.0, output='screen')
-            for node in MONITORS if not together
+            Node(
+                package='damadics_fd',
+                executable=node,
+                namespace=valve.name,
+                parameters=[*file, valve.settings_of(node)],
+                remappings=topics,
+                ros_arguments=['--enclave', f'/{valve.name}/{node}'],
+                respawn=True,
+                respawn_delay=1.0,
+                output='screen',
+            )
+            for node in MONITORS
+            if not together
         ]
         actions.append(
-            Node(package='damadics_plant', executable='plant', namespace=valve.name,
-                 ros_arguments=['--enclave', f'/{valve.name}/plant'],
-                 parameters=[{'duration': 1e8, 'wait_for_subscribers': 1,
-                              'actuator': valve.settings.get('actuator', valve.name),
-                              **valve.simulate}],
-                 remappings=topics, output='screen',
-                 condition=IfCondition(LaunchConfiguration('simulate')))
+            Node(
+                package='damadics_plant',
+                executable='plant',
+                namespace=valve.name,
+                ros_arguments=['--enclave', f'/{valve.name}/plant'],
+                parameters=[
+                    {
+                        'duration': 1e8,
+                        'wait_for_subscribers': 1,
+                        'actuator': valve.settings.get('actuator', valve.name),
+                        **valve.simulate,
+                    }
+                ],
+                remappings=topics,
+                output='screen',
+                condition=IfCondition(LaunchConfiguration('simulate')),
+            )
         )
     return actions
 
 
 def generate_launch_description():
     """Describe what is started."""
-    return LaunchDescription([
-        DeclareLaunchArgument('fleet', default_value=str(CONFIG / 'fleet.yaml'),
-                              description='list of the valves'),
-        DeclareLaunchArgument('processes', default_value='0', description='run all estimators '
-                              'and detectors in so many processes; 0: each in its own'),
-        DeclareLaunchArgument('simulate', default_value='false',
-                              description='start a simulated plant for each valve'),
-        DeclareLaunchArgument('dashboard', default_value='false', description='start the page'),
-        DeclareLaunchArgument('record', default_value='false', description='record all topics'),
-        DeclareLaunchArgument('bag', default_value='fleet_bag', description='folder of the bag'),
-        OpaqueFunction(function=valves),
-        Node(package='damadics_fd', executable='recorder',
-             arguments=['--all', '--out', LaunchConfiguration('bag')], output='screen',
-             ros_arguments=['--enclave', '/recorder'],
-             condition=IfCondition(LaunchConfiguration('record'))),
-        Node(package='damadics_dashboard', executable='dashboard', output='screen',
-             ros_arguments=['--enclave', '/dashboard'],
-             condition=IfCondition(LaunchConfiguration('dashboard'))),
-    ])
+    return LaunchDescription(
+        [
+            DeclareLaunchArgument(
+                'fleet', default_value=str(CONFIG / 'fleet.yaml'), description='list of the valves'
+            ),
+            DeclareLaunchArgument(
+                'processes',
+                default_value='0',
+                description='run all estimators '
+                'and detectors in so many processes; 0: each in its own',
+            ),
+            DeclareLaunchArgument(
+                'simulate',
+                default_value='false',
+                description='start a simulated plant for each valve',
+            ),
+            DeclareLaunchArgument(
+                'dashboard', default_value='false', description='start the page'
+            ),
+            DeclareLaunchArgument(
+                'record', default_value='false', description='record all topics'
+            ),
+            DeclareLaunchArgument(
+                'bag', default_value='fleet_bag', description='folder of the bag'
+            ),
+            OpaqueFunction(function=valves),
+            Node(
+                package='damadics_fd',
+                executable='recorder',
+                arguments=['--all', '--out', LaunchConfiguration('bag')],
+                output='screen',
+                ros_arguments=['--enclave', '/recorder'],
+                condition=IfCondition(LaunchConfiguration('record')),
+            ),
+            Node(
+                package='damadics_dashboard',
+                executable='dashboard',
+                output='screen',
+                ros_arguments=['--enclave', '/dashboard'],
+                condition=IfCondition(LaunchConfiguration('dashboard')),
+            ),
+        ]
+    )

@@ -12,18 +12,45 @@ from launch_ros.actions import Node
 def generate_launch_description():
     """Describe what is started."""
     parameters = {'mode': LaunchConfiguration('mode'), 'use_sim_time': True}
-    return LaunchDescription([
-        DeclareLaunchArgument('bag', description='bag directory or MCAP file'),
-        DeclareLaunchArgument('mode', default_value='monitor', description='mode of detection'),
-        DeclareLaunchArgument('rate', default_value='1.0', description='speed of the replay'),
-        DeclareLaunchArgument('dashboard', default_value='true', description='start the web page'),
-        Node(package='damadics_fd', executable='estimator', parameters=[parameters],
-             output='screen'),
-        Node(package='damadics_fd', executable='detector',
-             parameters=[{**parameters, 'alarm_folder': ''}], output='screen'),
-        Node(package='damadics_dashboard', executable='dashboard', output='screen',
-             condition=IfCondition(LaunchConfiguration('dashboard'))),
-        Node(package='damadics_fd', executable='replay', output='screen',
-             arguments=[LaunchConfiguration('bag'), '--live', '--rate',
-                        LaunchConfiguration('rate'), '--inputs-only']),
-    ])
+    return LaunchDescription(
+        [
+            DeclareLaunchArgument('bag', description='bag directory or MCAP file'),
+            DeclareLaunchArgument(
+                'mode', default_value='monitor', description='mode of detection'
+            ),
+            DeclareLaunchArgument('rate', default_value='1.0', description='speed of the replay'),
+            DeclareLaunchArgument(
+                'dashboard', default_value='true', description='start the web page'
+            ),
+            Node(
+                package='damadics_fd',
+                executable='estimator',
+                parameters=[parameters],
+                output='screen',
+            ),
+            Node(
+                package='damadics_fd',
+                executable='detector',
+                parameters=[{**parameters, 'alarm_folder': ''}],
+                output='screen',
+            ),
+            Node(
+                package='damadics_dashboard',
+                executable='dashboard',
+                output='screen',
+                condition=IfCondition(LaunchConfiguration('dashboard')),
+            ),
+            Node(
+                package='damadics_fd',
+                executable='replay',
+                output='screen',
+                arguments=[
+                    LaunchConfiguration('bag'),
+                    '--live',
+                    '--rate',
+                    LaunchConfiguration('rate'),
+                    '--inputs-only',
+                ],
+            ),
+        ]
+    )

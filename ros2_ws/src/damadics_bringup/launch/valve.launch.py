@@ -18,28 +18,80 @@ def generate_launch_description():
     """Describe what is started."""
     namespace = LaunchConfiguration('namespace')
     parameters = [LaunchConfiguration('parameters')]
-    return LaunchDescription([
-        DeclareLaunchArgument('parameters', default_value=str(CONFIG / 'valve.param.yaml'),
-                              description='parameter file of the valve'),
-        DeclareLaunchArgument('namespace', default_value='', description='namespace of the valve'),
-        DeclareLaunchArgument('simulate', default_value='false', description='start the plant'),
-        DeclareLaunchArgument('scenario', default_value='nominal',
-                              description='scenario of the plant; simulate --list shows all'),
-        DeclareLaunchArgument('dashboard', default_value='false', description='start the page'),
-        DeclareLaunchArgument('record', default_value='false', description='record all topics'),
-        DeclareLaunchArgument('bag', default_value='valve_bag', description='folder of the bag'),
-        Node(package='damadics_fd', executable='estimator', namespace=namespace,
-             parameters=parameters, respawn=True, respawn_delay=1.0, output='screen'),
-        Node(package='damadics_fd', executable='detector', namespace=namespace,
-             parameters=parameters, respawn=True, respawn_delay=1.0, output='screen'),
-        Node(package='damadics_fd', executable='recorder',
-             arguments=['--all', '--out', LaunchConfiguration('bag')], output='screen',
-             condition=IfCondition(LaunchConfiguration('record'))),
-        Node(package='damadics_plant', executable='plant', namespace=namespace,
-             parameters=[{'scenario': LaunchConfiguration('scenario'), 'model': 'lugre',
-                          'rate': 200.0, 'noise': True, 'duration': 1e8,
-                          'wait_for_subscribers': 1}],
-             output='screen', condition=IfCondition(LaunchConfiguration('simulate'))),
-        Node(package='damadics_dashboard', executable='dashboard', output='screen',
-             condition=IfCondition(LaunchConfiguration('dashboard'))),
-    ])
+    return LaunchDescription(
+        [
+            DeclareLaunchArgument(
+                'parameters',
+                default_value=str(CONFIG / 'valve.param.yaml'),
+                description='parameter file of the valve',
+            ),
+            DeclareLaunchArgument(
+                'namespace', default_value='', description='namespace of the valve'
+            ),
+            DeclareLaunchArgument(
+                'simulate', default_value='false', description='start the plant'
+            ),
+            DeclareLaunchArgument(
+                'scenario',
+                default_value='nominal',
+                description='scenario of the plant; simulate --list shows all',
+            ),
+            DeclareLaunchArgument(
+                'dashboard', default_value='false', description='start the page'
+            ),
+            DeclareLaunchArgument(
+                'record', default_value='false', description='record all topics'
+            ),
+            DeclareLaunchArgument(
+                'bag', default_value='valve_bag', description='folder of the bag'
+            ),
+            Node(
+                package='damadics_fd',
+                executable='estimator',
+                namespace=namespace,
+                parameters=parameters,
+                respawn=True,
+                respawn_delay=1.0,
+                output='screen',
+            ),
+            Node(
+                package='damadics_fd',
+                executable='detector',
+                namespace=namespace,
+                parameters=parameters,
+                respawn=True,
+                respawn_delay=1.0,
+                output='screen',
+            ),
+            Node(
+                package='damadics_fd',
+                executable='recorder',
+                arguments=['--all', '--out', LaunchConfiguration('bag')],
+                output='screen',
+                condition=IfCondition(LaunchConfiguration('record')),
+            ),
+            Node(
+                package='damadics_plant',
+                executable='plant',
+                namespace=namespace,
+                parameters=[
+                    {
+                        'scenario': LaunchConfiguration('scenario'),
+                        'model': 'lugre',
+                        'rate': 200.0,
+                        'noise': True,
+                        'duration': 1e8,
+                        'wait_for_subscribers': 1,
+                    }
+                ],
+                output='screen',
+                condition=IfCondition(LaunchConfiguration('simulate')),
+            ),
+            Node(
+                package='damadics_dashboard',
+                executable='dashboard',
+                output='screen',
+                condition=IfCondition(LaunchConfiguration('dashboard')),
+            ),
+        ]
+    )

@@ -16,14 +16,23 @@ from damadics_bringup.processes import (
 
 def test_parameters_are_written_as_ros_takes_them():
     assert parameters(mode='paper', rate=400.0, noise=True) == [
-        '--ros-args', '-p', 'mode:=paper', '-p', 'rate:=400.0', '-p', 'noise:=true',
+        '--ros-args',
+        '-p',
+        'mode:=paper',
+        '-p',
+        'rate:=400.0',
+        '-p',
+        'noise:=true',
     ]
 
 
 def test_a_text_stays_a_text():
     given = {'alarm_folder': '', 'actuator': '101', 'mode': 'paper', 'limits': [1.0, 2.5]}
     assert assignments(given)[1::2] == [
-        'alarm_folder:=""', 'actuator:="101"', 'mode:=paper', 'limits:=[1.0, 2.5]',
+        'alarm_folder:=""',
+        'actuator:="101"',
+        'mode:=paper',
+        'limits:=[1.0, 2.5]',
     ]
 
 
@@ -71,8 +80,11 @@ def test_a_process_that_ignores_signals_is_killed(tmp_path, monkeypatch):
 
 
 def test_all_processes_end_at_the_same_time_and_none_is_left(tmp_path, monkeypatch):
-    script(tmp_path, monkeypatch,
-           '#!/bin/bash\n[ $1 = no ] && trap "" INT\necho ready\nexec sleep 60\n')
+    script(
+        tmp_path,
+        monkeypatch,
+        '#!/bin/bash\n[ $1 = no ] && trap "" INT\necho ready\nexec sleep 60\n',
+    )
     stubborn = [f'stubborn {n}' for n in range(6)]
     with Processes(tmp_path / 'logs') as processes:
         for label in (*stubborn, 'obedient'):

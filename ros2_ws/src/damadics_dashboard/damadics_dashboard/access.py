@@ -45,8 +45,10 @@ def check_binding(host: str, token: str) -> None:
     :raises AccessError: naming the remedy.
     """
     if token and len(token) < LEAST_TOKEN:
-        raise AccessError(f'the token is too short: use {LEAST_TOKEN} characters or more, such as '
-                          'from: openssl rand -hex 16')
+        raise AccessError(
+            f'the token is too short: use {LEAST_TOKEN} characters or more, such as '
+            'from: openssl rand -hex 16'
+        )
     if not loopback(host) and not token:
         raise AccessError(
             f'--host {host} opens the page to the network: put a token into the file of '
@@ -117,15 +119,27 @@ async def _refuse(scope: Any, send: Any, text: str) -> None:
     if scope['type'] == 'websocket':
         await send({'type': 'websocket.close', 'code': 1008})
         return
-    await send({'type': 'http.response.start', 'status': 403,
-                'headers': [(b'content-type', b'text/plain; charset=utf-8')]})
+    await send(
+        {
+            'type': 'http.response.start',
+            'status': 403,
+            'headers': [(b'content-type', b'text/plain; charset=utf-8')],
+        }
+    )
     await send({'type': 'http.response.body', 'body': f'{text}\n'.encode()})
 
 
 async def _redirect(scope: Any, send: Any, token: str) -> None:
     """Move the token from the address, where it would be seen and logged, into a cookie."""
     cookie = f'{COOKIE}={token}; Path=/; HttpOnly; SameSite=Strict'
-    await send({'type': 'http.response.start', 'status': 303, 'headers': [
-        (b'location', scope['path'].encode()), (b'set-cookie', cookie.encode()),
-    ]})
+    await send(
+        {
+            'type': 'http.response.start',
+            'status': 303,
+            'headers': [
+                (b'location', scope['path'].encode()),
+                (b'set-cookie', cookie.encode()),
+            ],
+        }
+    )
     await send({'type': 'http.response.body', 'body': b''})

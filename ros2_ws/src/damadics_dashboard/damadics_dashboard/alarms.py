@@ -22,16 +22,18 @@ class AlarmList:
     :param name: whether to name the valve of each alarm.
     """
 
-    def __init__(self, watcher: Watcher, valves: Callable[[], Iterable[Valve]], *,
-                 name: bool) -> None:
+    def __init__(
+        self, watcher: Watcher, valves: Callable[[], Iterable[Valve]], *, name: bool
+    ) -> None:
         self._watcher = watcher
         self._valves = valves
         self._name = name
         self._rows: dict[tuple[str, int], tuple[ui.element, ui.html, ui.button]] = {}
         self._order: list[tuple[str, int]] = []
         self._empty = ui.html('<p class="empty">No alarms.</p>', sanitize=False)
-        self._box = ui.element('div').classes('stack').props(
-            'role="list" aria-label="present alarms"')
+        self._box = (
+            ui.element('div').classes('stack').props('role="list" aria-label="present alarms"')
+        )
 
     def update(self) -> int:
         """
@@ -56,9 +58,11 @@ class AlarmList:
             kind = markup.alarm_kind(alarm)
             fresh = 'fresh' if not alarm.acknowledged and alarm.state == 'active' else ''
             row.classes(replace=f'alarm {kind} {fresh}')
-            content = f'<div class="row">' \
-                      f'{markup.symbol(kind)}<div>' \
-                      f'{markup.alarm_body(valve, alarm, name=self._name)}</div></div>'
+            content = (
+                f'<div class="row">'
+                f'{markup.symbol(kind)}<div>'
+                f'{markup.alarm_body(valve, alarm, name=self._name)}</div></div>'
+            )
             if body.content != content:
                 body.set_content(content)
         order = sorted(present, key=lambda k: (-present[k][1].level, k))

@@ -26,18 +26,34 @@ def parser() -> argparse.ArgumentParser:
 
     :return: its parser.
     """
-    p = command_parser('dashboard', 'Web page for the people at the plant: every valve, its '
-                       'alarms, its signals.', EXAMPLE)
+    p = command_parser(
+        'dashboard',
+        'Web page for the people at the plant: every valve, its alarms, its signals.',
+        EXAMPLE,
+    )
     p.add_argument('--host', default='127.0.0.1', help='address to serve on (127.0.0.1)')
     p.add_argument('--port', type=int, default=8080, help='port to serve on (8080)')
-    p.add_argument('--token-file', type=Path, metavar='FILE',
-                   help='file with the token that other machines must show; or set '
-                        'DAMADICS_DASHBOARD_TOKEN')
-    p.add_argument('--state', type=Path, metavar='DIR', default=state_folder(),
-                   help='where the alarm history is kept (%(default)s)')
-    p.add_argument('--follow', type=int, default=16, metavar='N',
-                   help='take all samples of all valves in fleets up to N, otherwise only of '
-                        'those that are looked at (16)')
+    p.add_argument(
+        '--token-file',
+        type=Path,
+        metavar='FILE',
+        help='file with the token that other machines must show; or set DAMADICS_DASHBOARD_TOKEN',
+    )
+    p.add_argument(
+        '--state',
+        type=Path,
+        metavar='DIR',
+        default=state_folder(),
+        help='where the alarm history is kept (%(default)s)',
+    )
+    p.add_argument(
+        '--follow',
+        type=int,
+        default=16,
+        metavar='N',
+        help='take all samples of all valves in fleets up to N, otherwise only of '
+        'those that are looked at (16)',
+    )
     p.add_argument('--show', action='store_true', help='open the page in a browser')
     return p
 
@@ -124,12 +140,28 @@ def serve(options: argparse.Namespace, token: str, ros_args: list[str]) -> None:
     app.on_shutdown(watcher.stop)
     app.on_shutdown(history.close)
     shown = f'[{options.host}]' if ':' in options.host else options.host
-    app.on_startup(lambda: print(
-        f'The dashboard is at http://{shown}:{options.port}' + ('/?token=...' if token else ''),
-        flush=True))
-    ui.run(host=options.host, port=options.port, title='DAMADICS FD', favicon=FAVICON, dark=None,
-           show=options.show, reload=False, show_welcome_message=False, language='en-US',
-           tailwind=False, unocss=None, uvicorn_logging_level='warning', reconnect_timeout=10.0)
+    app.on_startup(
+        lambda: print(
+            f'The dashboard is at http://{shown}:{options.port}'
+            + ('/?token=...' if token else ''),
+            flush=True,
+        )
+    )
+    ui.run(
+        host=options.host,
+        port=options.port,
+        title='DAMADICS FD',
+        favicon=FAVICON,
+        dark=None,
+        show=options.show,
+        reload=False,
+        show_welcome_message=False,
+        language='en-US',
+        tailwind=False,
+        unocss=None,
+        uvicorn_logging_level='warning',
+        reconnect_timeout=10.0,
+    )
 
 
 def _take_one_signal() -> None:

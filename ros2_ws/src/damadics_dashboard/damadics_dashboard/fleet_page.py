@@ -12,9 +12,15 @@ from damadics_dashboard.frame import frame
 from damadics_dashboard.watcher import Watcher
 
 PERIOD = 0.2  # s
-CLASSES = (('F', 'failure'), ('S', 'out of specification'), ('M', 'maintenance'),
-           ('C', 'function check'), ('off', 'not monitored'), ('learn', 'learning'),
-           ('ok', 'healthy'))
+CLASSES = (
+    ('F', 'failure'),
+    ('S', 'out of specification'),
+    ('M', 'maintenance'),
+    ('C', 'function check'),
+    ('off', 'not monitored'),
+    ('learn', 'learning'),
+    ('ok', 'healthy'),
+)
 START = 'ros2 run damadics_bringup run --simulate'
 
 
@@ -33,7 +39,9 @@ def fleet_page(watcher: Watcher) -> None:
             '<div class="card"><h2>No valve on this ROS domain yet</h2><p class="sub" '
             'style="margin:6px 0 10px">A valve appears by itself as soon as its detector or its '
             'measurement is there. To try it with a simulated valve:</p>'
-            f'<span class="code">{START}</span></div>', sanitize=False).classes('w-full')
+            f'<span class="code">{START}</span></div>',
+            sanitize=False,
+        ).classes('w-full')
         tiles = ui.element('div').classes('tiles').props('role="list" aria-label="valves"')
         with ui.element('section').classes('card w-full').props('aria-label="alarms"'):
             with ui.element('div').classes('head'):
@@ -57,7 +65,8 @@ def fleet_page(watcher: Watcher) -> None:
             summary = ''.join(
                 f'<span class="count {"" if kinds.count(kind) else "none"}">'
                 f'{markup.symbol(kind)}<b>{kinds.count(kind)}</b>{words}</span>'
-                for kind, words in CLASSES if kinds.count(kind) or kind in ('F', 'off', 'ok')
+                for kind, words in CLASSES
+                if kinds.count(kind) or kind in ('F', 'off', 'ok')
             )
             if counts.content != summary:
                 counts.set_content(summary)

@@ -18,12 +18,16 @@ VALVE = (
     '<path d="M7 9a7 6 0 0 1 14 0z" fill="currentColor" fill-opacity=".18"/></svg>'
 )
 FAVICON = VALVE.replace('<svg ', '<svg xmlns="http://www.w3.org/2000/svg" ', 1).replace(
-    'currentColor', '#0a64bd')
+    'currentColor', '#0a64bd'
+)
 VERSION = 2  # of the static files, for the caches of browsers
 PAGES = (('/', 'Fleet'), ('/history', 'History'), ('/replay', 'Replay'))
 NEXT_THEME = {None: True, True: False, False: None}
-THEME = {None: ('brightness_auto', 'follow the system'), True: ('dark_mode', 'dark'),
-         False: ('light_mode', 'light')}
+THEME = {
+    None: ('brightness_auto', 'follow the system'),
+    True: ('dark_mode', 'dark'),
+    False: ('light_mode', 'light'),
+}
 
 
 @contextmanager
@@ -36,17 +40,29 @@ def frame(title: str, here: str, watcher: Watcher) -> Iterator[None]:
     :param watcher: the ROS side.
     """
     ui.page_title(f'{title} · DAMADICS FD')
-    ui.add_head_html(f'<link rel="stylesheet" href="/assets/style.css?{VERSION}">'
-                     f'<script src="/assets/live.js?{VERSION}"></script>')
-    ui.colors(primary='#0a64bd', positive='#1d8650', negative='#c3262e', dark='#151c23',
-              dark_page='#0d1217')
+    ui.add_head_html(
+        f'<link rel="stylesheet" href="/assets/style.css?{VERSION}">'
+        f'<script src="/assets/live.js?{VERSION}"></script>'
+    )
+    ui.colors(
+        primary='#0a64bd',
+        positive='#1d8650',
+        negative='#c3262e',
+        dark='#151c23',
+        dark_page='#0d1217',
+    )
     dark = ui.dark_mode(_stored_theme())
-    ui.html('<a class="skip" href="#content">Skip to content</a>'
-            '<div id="announcer" class="unseen" aria-live="assertive"></div>', sanitize=False)
+    ui.html(
+        '<a class="skip" href="#content">Skip to content</a>'
+        '<div id="announcer" class="unseen" aria-live="assertive"></div>',
+        sanitize=False,
+    )
     with ui.element('header').classes('bar'):
-        ui.html(f'<a class="brand" href="/" aria-label="DAMADICS FD, start page">{VALVE}'
-                '<span>DAMADICS FD<small>control valve condition</small></span></a>',
-                sanitize=False)
+        ui.html(
+            f'<a class="brand" href="/" aria-label="DAMADICS FD, start page">{VALVE}'
+            '<span>DAMADICS FD<small>control valve condition</small></span></a>',
+            sanitize=False,
+        )
         links = ''.join(
             f'<a href="{path}"{" aria-current=page" if path == here else ""}>{name}</a>'
             for path, name in PAGES
@@ -58,8 +74,10 @@ def frame(title: str, here: str, watcher: Watcher) -> Iterator[None]:
         def show_link() -> None:
             good = watcher.alive
             words = 'ROS 2 connected' if good else 'ROS 2 connection lost: restart the dashboard'
-            link.set_content(f'<span class="link {"on" if good else ""}" role="status">'
-                             f'<i></i><span>{words}</span></span>')
+            link.set_content(
+                f'<span class="link {"on" if good else ""}" role="status">'
+                f'<i></i><span>{words}</span></span>'
+            )
 
         show_link()
         ui.timer(1.0, show_link)
@@ -68,12 +86,17 @@ def frame(title: str, here: str, watcher: Watcher) -> Iterator[None]:
             dark.value = NEXT_THEME[dark.value]
             icon, words = THEME[dark.value]
             button.props(f'icon={icon} aria-label="colours: {words}"')
-            ui.run_javascript(f"document.cookie='theme={json.dumps(dark.value)}; path=/; "
-                              "max-age=31536000; samesite=strict'")
+            ui.run_javascript(
+                f"document.cookie='theme={json.dumps(dark.value)}; path=/; "
+                "max-age=31536000; samesite=strict'"
+            )
 
         icon, words = THEME[dark.value]
-        button = ui.button(icon=icon, on_click=change, color=None).props(
-            f'flat round dense aria-label="colours: {words}"').style('color: var(--muted)')
+        button = (
+            ui.button(icon=icon, on_click=change, color=None)
+            .props(f'flat round dense aria-label="colours: {words}"')
+            .style('color: var(--muted)')
+        )
     with ui.element('main').classes('page').props('id=content'):
         yield
 

@@ -10,8 +10,24 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-COLUMNS = ('valve', 'stamp', 'seen', 'transition', 'occurrence', 'level', 'onset', 'residual',
-           'threshold', 'ratio', 'duration', 'cause', 'confidence', 'strength', 'text', 'advice')
+COLUMNS = (
+    'valve',
+    'stamp',
+    'seen',
+    'transition',
+    'occurrence',
+    'level',
+    'onset',
+    'residual',
+    'threshold',
+    'ratio',
+    'duration',
+    'cause',
+    'confidence',
+    'strength',
+    'text',
+    'advice',
+)
 IDENTITY = ('valve', 'stamp', 'transition', 'occurrence', 'text')
 MOST_REPEATED = 20_000  # transitions of 200 valves
 Row = dict[str, Any]
@@ -37,9 +53,12 @@ class History:
         )
         self._db.commit()
         # A detector repeats its last events to a newcomer, such as this page after its restart.
-        self._known = Counter(tuple(row) for row in self._db.execute(
-            f'SELECT {", ".join(IDENTITY)} FROM event ORDER BY rowid DESC LIMIT {MOST_REPEATED}'
-        ))
+        self._known = Counter(
+            tuple(row)
+            for row in self._db.execute(
+                f'SELECT {", ".join(IDENTITY)} FROM event ORDER BY rowid DESC LIMIT {MOST_REPEATED}'  # noqa: E501
+            )
+        )
 
     def add(self, event: Mapping[str, Any]) -> bool:
         """

@@ -19,19 +19,23 @@ FORMS = {
     'S': '<path d="M14 1.5 27 25H1z"/>',
     'M': '<path d="M14 .5 27.5 14 14 27.5.5 14z"/>',
     'ok': '<circle cx="14" cy="14" r="12" fill="none" stroke="currentColor" stroke-width="2"/>'
-          '<path d="m8.5 14.5 4 4 7-8.5" fill="none" stroke="currentColor" stroke-width="2.6" '
-          'stroke-linecap="round" stroke-linejoin="round"/>',
+    '<path d="m8.5 14.5 4 4 7-8.5" fill="none" stroke="currentColor" stroke-width="2.6" '
+    'stroke-linecap="round" stroke-linejoin="round"/>',
     'learn': '<circle cx="14" cy="14" r="12" fill="none" stroke="currentColor" stroke-width="2" '
-             'stroke-dasharray="4 3.5"/><circle cx="14" cy="14" r="4"/>',
+    'stroke-dasharray="4 3.5"/><circle cx="14" cy="14" r="4"/>',
     'off': '<circle cx="14" cy="14" r="12" fill="none" stroke="currentColor" stroke-width="2"/>'
-           '<path d="M8 14h12" stroke="currentColor" stroke-width="2.6" stroke-linecap="round"/>',
+    '<path d="M8 14h12" stroke="currentColor" stroke-width="2.6" stroke-linecap="round"/>',
 }
 LETTER_AT = {'F': 18.3, 'C': 14.5, 'S': 22.0, 'M': 18.3}
 TRANSITIONS = {
-    FaultEvent.RAISED: 'raised', FaultEvent.CLEARED: 'cleared',
-    FaultEvent.ACKNOWLEDGED: 'acknowledged', FaultEvent.RESET: 'reset',
-    FaultEvent.SHELVED: 'shelved', FaultEvent.UNSHELVED: 'unshelved',
-    FaultEvent.NEAR_MISS: 'near miss', FaultEvent.CHANGED: 'changed',
+    FaultEvent.RAISED: 'raised',
+    FaultEvent.CLEARED: 'cleared',
+    FaultEvent.ACKNOWLEDGED: 'acknowledged',
+    FaultEvent.RESET: 'reset',
+    FaultEvent.SHELVED: 'shelved',
+    FaultEvent.UNSHELVED: 'unshelved',
+    FaultEvent.NEAR_MISS: 'near miss',
+    FaultEvent.CHANGED: 'changed',
 }
 
 
@@ -46,8 +50,10 @@ def symbol(kind: str, more: str = '') -> str:
     letter = ''
     if kind in LETTER_AT:
         letter = f'<text x="14" y="{LETTER_AT[kind]}">{kind}</text>'
-    return (f'<span class="ne {kind} {more}" aria-hidden="true"><svg viewBox="0 0 28 28" '
-            f'fill="currentColor">{FORMS[kind]}{letter}</svg></span>')
+    return (
+        f'<span class="ne {kind} {more}" aria-hidden="true"><svg viewBox="0 0 28 28" '
+        f'fill="currentColor">{FORMS[kind]}{letter}</svg></span>'
+    )
 
 
 def number(value: float | None, unit: str = '', digits: int = 3) -> str:
@@ -71,15 +77,18 @@ def spark(ratios: Iterable[float]) -> str:
     :param ratios: oldest first.
     :return: an SVG.
     """
-    heights = [38.0 - 38.0 * min(max((math.log10(max(r, 1e-9)) + 2.0) / 4.0, 0.0), 1.0)
-               for r in ratios]
+    heights = [
+        38.0 - 38.0 * min(max((math.log10(max(r, 1e-9)) + 2.0) / 4.0, 0.0), 1.0) for r in ratios
+    ]
     points = ' '.join(
         f'{200.0 * n / max(len(heights) - 1, 1):.1f},{y:.1f}' for n, y in enumerate(heights)
     )
     limit = 38.0 - 38.0 * 2.0 / 4.0
-    return (f'<svg class="spark" viewBox="0 0 200 38" preserveAspectRatio="none" '
-            f'aria-hidden="true"><line class="limit" x1="0" x2="200" y1="{limit:.1f}" '
-            f'y2="{limit:.1f}"/><polyline class="curve" points="{points}"/></svg>')
+    return (
+        f'<svg class="spark" viewBox="0 0 200 38" preserveAspectRatio="none" '
+        f'aria-hidden="true"><line class="limit" x1="0" x2="200" y1="{limit:.1f}" '
+        f'y2="{limit:.1f}"/><polyline class="curve" points="{points}"/></svg>'
+    )
 
 
 def tile(valve: Valve, now: float) -> str:
@@ -103,14 +112,19 @@ def tile(valve: Valve, now: float) -> str:
     if condition.kind == 'off' and alarm is not None:
         badge = '<span class="tag hot">alarm before the silence</span>'
     elif alarm is not None:
-        badge = ('<span class="tag done">acknowledged</span>' if alarm.acknowledged
-                 else '<span class="tag hot">unacknowledged</span>')
+        badge = (
+            '<span class="tag done">acknowledged</span>'
+            if alarm.acknowledged
+            else '<span class="tag hot">unacknowledged</span>'
+        )
     meter = ''
     if condition.kind == 'learn':
         percent = 100.0 * valve.progress
-        meter = (f'<div class="meter" role="progressbar" aria-label="learning" '
-                 f'aria-valuemin="0" aria-valuemax="100" aria-valuenow="{percent:.0f}">'
-                 f'<i style="width:{percent:.1f}%"></i></div>')
+        meter = (
+            f'<div class="meter" role="progressbar" aria-label="learning" '
+            f'aria-valuemin="0" aria-valuemax="100" aria-valuenow="{percent:.0f}">'
+            f'<i style="width:{percent:.1f}%"></i></div>'
+        )
     name = escape(valve.title)
     tag = f' · {escape(valve.tag)}' if valve.tag and valve.tag != valve.title else ''
     label = escape(f'{valve.title}: {condition.title}, {condition.detail}', quote=True)
@@ -178,8 +192,11 @@ def alarm_body(valve: Valve, alarm: Alarm, *, name: bool) -> str:
     e = alarm.evidence
     who = f'{escape(valve.title)} · ' if name else ''
     cause = (e.get('cause') or 'cause unknown').replace('_', ' ')
-    seen = ('<span class="tag done">acknowledged</span>' if alarm.acknowledged
-            else '<span class="tag hot">unacknowledged</span>')
+    seen = (
+        '<span class="tag done">acknowledged</span>'
+        if alarm.acknowledged
+        else '<span class="tag hot">unacknowledged</span>'
+    )
     words = NE107.get(alarm.level, ('', 'shelved'))[1]
     cells = [
         ('onset', moment(alarm.onset)),
@@ -223,8 +240,12 @@ def history_table(rows: list[dict[str, Any]], *, name: bool) -> str:
     lines = []
     for row in rows:
         kind = NE107.get(row['level'], ('', ''))[0] or 'ok'
-        who = f'<td class="nowrap"><a href="{address(row["valve"])}">' \
-              f'{escape(row["valve"] or "valve")}</a></td>' if name else ''
+        who = (
+            f'<td class="nowrap"><a href="{address(row["valve"])}">'
+            f'{escape(row["valve"] or "valve")}</a></td>'
+            if name
+            else ''
+        )
         lines.append(
             f'<tr><td class="nowrap">{moment(row["stamp"])}</td>{who}'
             f'<td class="nowrap">{symbol(kind)}</td>'

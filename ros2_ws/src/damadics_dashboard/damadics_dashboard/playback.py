@@ -111,13 +111,16 @@ def _draw(done: Playback, columns: dict[str, NDArray[Any]], result: Any, width: 
     order = np.argsort(stamp, kind='stable')
     stamp = stamp[order]
     signals = {
-        'cv': columns['cv'], 'x1': columns['x1'], 'x2': result.estimates['x2'],
+        'cv': columns['cv'],
+        'x1': columns['x1'],
+        'x2': result.estimates['x2'],
         'residual': np.maximum(result.decisions['residual'], SMALLEST),
         'threshold': np.maximum(result.decisions['threshold'], SMALLEST),
     }
     done.curves = {
-        name: envelope(stamp, np.asarray(values)[order], width,
-                       largest=name in ('residual', 'threshold'))
+        name: envelope(
+            stamp, np.asarray(values)[order], width, largest=name in ('residual', 'threshold')
+        )
         for name, values in signals.items()
     }
     cloud = np.zeros(len(stamp), [('stamp', 'i8'), ('x', 'f8'), ('u', 'f8')])
@@ -126,8 +129,9 @@ def _draw(done: Playback, columns: dict[str, NDArray[Any]], result: Any, width: 
     parts = [cloud]
     if done.alarms:
         parts = np.split(cloud, [int(np.searchsorted(stamp, done.alarms[0].stamp))])
-    done.signature = [block_means(part, 'x', 'u', max(BLOCK, width))[:MOST_POINTS]
-                      for part in parts]
+    done.signature = [
+        block_means(part, 'x', 'u', max(BLOCK, width))[:MOST_POINTS] for part in parts
+    ]
 
 
 def _truth(recording: Recording, done: Playback) -> str:
@@ -141,5 +145,6 @@ def _truth(recording: Recording, done: Playback) -> str:
     start = int(truth['stamp'][here[0]])
     text = f'fault f{int(truth["fault"][here[0]])} was simulated from {start / NANO:.2f} s'
     after = [alarm for alarm in done.alarms if alarm.stamp >= start]
-    return text + (f', flagged {(after[0].stamp - start) / NANO:.2f} s later' if after else
-                   ', not flagged')
+    return text + (
+        f', flagged {(after[0].stamp - start) / NANO:.2f} s later' if after else ', not flagged'
+    )

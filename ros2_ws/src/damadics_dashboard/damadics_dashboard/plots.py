@@ -17,9 +17,17 @@ BLOCK = NANO // 10  # of the signature: means over 0.1 s cancel 50 and 60 Hz hum
 SMALLEST = 1e-5  # 1/s; a logarithmic axis has no zero
 
 
-def time_plot(names: list[str], unit: str, *, log: bool = False, low: float | None = None,
-              high: float | None = None, dashed: tuple[str, ...] = (), zoom: bool = False,
-              digits: int = 2) -> dict[str, Any]:
+def time_plot(
+    names: list[str],
+    unit: str,
+    *,
+    log: bool = False,
+    low: float | None = None,
+    high: float | None = None,
+    dashed: tuple[str, ...] = (),
+    zoom: bool = False,
+    digits: int = 2,
+) -> dict[str, Any]:
     """
     Return the options of a plot over time.
 
@@ -33,9 +41,14 @@ def time_plot(names: list[str], unit: str, *, log: bool = False, low: float | No
     :param digits: places of the numbers on the axis.
     :return: ECharts options.
     """
-    axis: dict[str, Any] = {'type': 'log' if log else 'value', 'name': unit,
-                            'nameTextStyle': {'align': 'left'}, 'nameGap': 10, 'scale': True,
-                            'splitNumber': 4}
+    axis: dict[str, Any] = {
+        'type': 'log' if log else 'value',
+        'name': unit,
+        'nameTextStyle': {'align': 'left'},
+        'nameGap': 10,
+        'scale': True,
+        'splitNumber': 4,
+    }
     if low is not None:
         axis['min'] = low
     if high is not None:
@@ -47,22 +60,38 @@ def time_plot(names: list[str], unit: str, *, log: bool = False, low: float | No
         'grid': {'left': 52, 'right': 14, 'top': 34, 'bottom': 52 if zoom else 24},
         'legend': {'top': 0, 'right': 6, 'itemWidth': 16, 'itemHeight': 8, 'icon': 'roundRect'},
         'tooltip': {'trigger': 'axis', 'axisPointer': {'type': 'line'}, 'confine': True},
-        'xAxis': {'type': 'value', 'min': 0, 'max': 60, 'splitNumber': 6,
-                  'axisLabel': {'showMinLabel': False, 'showMaxLabel': False},
-                  'splitLine': {'show': False}},
+        'xAxis': {
+            'type': 'value',
+            'min': 0,
+            'max': 60,
+            'splitNumber': 6,
+            'axisLabel': {'showMinLabel': False, 'showMaxLabel': False},
+            'splitLine': {'show': False},
+        },
         'yAxis': axis,
         'series': [
-            {'type': 'line', 'name': name, 'data': [], 'showSymbol': False,
-             'emphasis': {'disabled': True},
-             'lineStyle': {'width': 1.8, 'type': 'dashed' if name in dashed else 'solid'}}
+            {
+                'type': 'line',
+                'name': name,
+                'data': [],
+                'showSymbol': False,
+                'emphasis': {'disabled': True},
+                'lineStyle': {'width': 1.8, 'type': 'dashed' if name in dashed else 'solid'},
+            }
             for name in names
         ],
     }
     if zoom:
         option['dataZoom'] = [
             {'type': 'inside', 'filterMode': 'none'},
-            {'type': 'slider', 'height': 16, 'bottom': 6, 'filterMode': 'none',
-             'showDataShadow': False, 'labelFormatter': ''},
+            {
+                'type': 'slider',
+                'height': 16,
+                'bottom': 6,
+                'filterMode': 'none',
+                'showDataShadow': False,
+                'labelFormatter': '',
+            },
         ]
     return option
 
@@ -79,14 +108,33 @@ def signature_plot(names: tuple[str, ...]) -> dict[str, Any]:
         'grid': {'left': 52, 'right': 16, 'top': 34, 'bottom': 40},
         'legend': {'top': 0, 'right': 6, 'itemWidth': 10, 'itemHeight': 10, 'icon': 'circle'},
         'tooltip': {'trigger': 'item', 'confine': True},
-        'xAxis': {'type': 'value', 'name': 'position [1]', 'nameLocation': 'middle',
-                  'nameGap': 24, 'scale': True, 'splitNumber': 5},
-        'yAxis': {'type': 'value', 'name': 'input u [1]', 'nameTextStyle': {'align': 'left'},
-                  'nameGap': 10, 'scale': True, 'splitNumber': 5},
+        'xAxis': {
+            'type': 'value',
+            'name': 'position [1]',
+            'nameLocation': 'middle',
+            'nameGap': 24,
+            'scale': True,
+            'splitNumber': 5,
+        },
+        'yAxis': {
+            'type': 'value',
+            'name': 'input u [1]',
+            'nameTextStyle': {'align': 'left'},
+            'nameGap': 10,
+            'scale': True,
+            'splitNumber': 5,
+        },
         'series': [
-            {'type': 'scatter', 'name': name, 'data': [], 'symbolSize': 4, 'large': True,
-             'emphasis': {'disabled': True}, 'itemStyle': {'opacity': opacity}}
-            for name, opacity in zip(names, (0.55, 0.9)[-len(names):], strict=True)
+            {
+                'type': 'scatter',
+                'name': name,
+                'data': [],
+                'symbolSize': 4,
+                'large': True,
+                'emphasis': {'disabled': True},
+                'itemStyle': {'opacity': opacity},
+            }
+            for name, opacity in zip(names, (0.55, 0.9)[-len(names) :], strict=True)
         ],
     }
 
@@ -101,8 +149,9 @@ class Plot:
     :param style: CSS classes.
     """
 
-    def __init__(self, options: dict[str, Any], colors: list[str], label: str,
-                 style: str = 'plot') -> None:
+    def __init__(
+        self, options: dict[str, Any], colors: list[str], label: str, style: str = 'plot'
+    ) -> None:
         xy = options['series'][0]['type'] == 'scatter'
         self.chart = ui.echart(options).classes(style)
         self.chart.props(f'role="img" aria-label="{label}"')
@@ -170,8 +219,12 @@ class Feed:
             self.restart()
         self._end = end
         width = int(self.window * NANO / BUCKETS)
-        first = min(int(c.trace.rows['stamp'][0]) for curves in self.curves.values()
-                    for c in curves if c.trace.newest >= 0)
+        first = min(
+            int(c.trace.rows['stamp'][0])
+            for curves in self.curves.values()
+            for c in curves
+            if c.trace.newest >= 0
+        )
         begin = max(end - int(self.window * NANO), first)
         last = begin + int(self.window * NANO)
         message: dict[int, Any] = {}
@@ -187,8 +240,12 @@ class Feed:
                     curve.sent = newest - newest % width
                 series.append(_rounded(points))
                 starts.append((start - start % width) * 1e-9 - 1e-6)
-            message[plot] = {'all': everything, 'from': starts, 'series': series,
-                             'range': [begin * 1e-9, last * 1e-9]}
+            message[plot] = {
+                'all': everything,
+                'from': starts,
+                'series': series,
+                'range': [begin * 1e-9, last * 1e-9],
+            }
         return message
 
 
@@ -209,8 +266,9 @@ def signature(trace: Trace, seconds: float) -> tuple[Points, Points]:
     reference = learning if len(learning) else before
     keep = int(60.0 * NANO)
     if len(reference):
-        reference = reference[:int(np.searchsorted(
-            reference['stamp'], reference['stamp'][0] + keep))]
+        reference = reference[
+            : int(np.searchsorted(reference['stamp'], reference['stamp'][0] + keep))
+        ]
     return (block_means(reference, 'x', 'u', BLOCK), block_means(rows[split:], 'x', 'u', BLOCK))
 
 

@@ -32,8 +32,11 @@ def replay_page(watcher: Watcher) -> None:
         with ui.element('div').classes('row w-full'):
             ui.html('<h1>Replay a recording</h1>', sanitize=False)
             ui.element('span').classes('spacer')
-            mode = ui.toggle(list(MODES), value=MODES[0]).props(
-                'no-caps dense unelevated padding="4px 12px" aria-label="mode"').classes('seg')
+            mode = (
+                ui.toggle(list(MODES), value=MODES[0])
+                .props('no-caps dense unelevated padding="4px 12px" aria-label="mode"')
+                .classes('seg')
+            )
         results = ui.element('div').classes('stack w-full')
 
         async def take(event: Any) -> None:
@@ -52,8 +55,11 @@ def replay_page(watcher: Watcher) -> None:
             results.clear()
             with results:
                 if isinstance(shown, str):
-                    ui.html(f'<div class="card" role="alert"><h2>{escape(name)} cannot be replayed'
-                            f'</h2><p class="sub">{escape(shown)}</p></div>', sanitize=False)
+                    ui.html(
+                        f'<div class="card" role="alert"><h2>{escape(name)} cannot be replayed'
+                        f'</h2><p class="sub">{escape(shown)}</p></div>',
+                        sanitize=False,
+                    )
                 else:
                     for playback in shown:
                         _show(playback, mode.value)
@@ -61,11 +67,16 @@ def replay_page(watcher: Watcher) -> None:
             upload.enable()
 
         with ui.element('div').classes('drop w-full') as box:
-            upload = ui.upload(on_upload=take, auto_upload=True, max_file_size=LARGEST,
-                               label=HINT, on_rejected=lambda: ui.notify(
-                                   'this file is too large for the page: ros2 run damadics_fd '
-                                   'replay FILE', type='negative')).props(
-                'accept=".mcap,.csv,.txt" flat aria-label="recording to replay"')
+            upload = ui.upload(
+                on_upload=take,
+                auto_upload=True,
+                max_file_size=LARGEST,
+                label=HINT,
+                on_rejected=lambda: ui.notify(
+                    'this file is too large for the page: ros2 run damadics_fd replay FILE',
+                    type='negative',
+                ),
+            ).props('accept=".mcap,.csv,.txt" flat aria-label="recording to replay"')
         box.move(target_index=1)
 
 
@@ -74,36 +85,75 @@ def _show(done: Playback, mode: str) -> None:
     alarms = done.alarms
     worst = max((e.level for e in done.events if alarms), default=0)
     kind = markup.NE107.get(worst, ('', ''))[0] or 'ok'
-    verdict = (f'{len(alarms)} alarm{"s" if len(alarms) > 1 else ""}, the first at '
-               f'{moment(alarms[0].stamp)}' if alarms else 'No alarm')
-    cause = next((e.cause for e in reversed(done.events)
-                  if e.cause not in ('', 'undetermined')), '')
-    detail = ' · '.join(filter(None, (
-        done.name, f'mode {mode}', f'{done.samples} samples', age(done.duration), done.truth,
-        f'suspected: {cause}' if cause else '')))
+    verdict = (
+        f'{len(alarms)} alarm{"s" if len(alarms) > 1 else ""}, the first at '
+        f'{moment(alarms[0].stamp)}'
+        if alarms
+        else 'No alarm'
+    )
+    cause = next(
+        (e.cause for e in reversed(done.events) if e.cause not in ('', 'undetermined')), ''
+    )
+    detail = ' · '.join(
+        filter(
+            None,
+            (
+                done.name,
+                f'mode {mode}',
+                f'{done.samples} samples',
+                age(done.duration),
+                done.truth,
+                f'suspected: {cause}' if cause else '',
+            ),
+        )
+    )
     lost = ''.join(f'<div class="sub">left out: {escape(p)}</div>' for p in done.problems[:5])
-    ui.html(f'<div class="banner {kind}" data-kind="{kind}" role="status">'
-            f'{markup.symbol(kind, "big")}<span class="words"><span class="title">'
-            f'{escape(verdict)}</span><br><span class="sub">{escape(detail)}</span>{lost}</span>'
-            '</div>', sanitize=False).classes('w-full')
+    ui.html(
+        f'<div class="banner {kind}" data-kind="{kind}" role="status">'
+        f'{markup.symbol(kind, "big")}<span class="words"><span class="title">'
+        f'{escape(verdict)}</span><br><span class="sub">{escape(detail)}</span>{lost}</span>'
+        '</div>',
+        sanitize=False,
+    ).classes('w-full')
     with ui.element('div').classes('grid'):
         with ui.element('div').classes('stack'):
             plots = [
-                _plot('Control value and position', ['CV', 'X1'], ['cv', 'x1'],
-                      ['--cv', '--x1'], done, '[1]', low=0.0, high=1.0, dashed=('CV',)),
-                _plot('Residual against threshold', ['residual', 'threshold'],
-                      ['residual', 'threshold'], ['--residual', '--rho'], done, '[1/s]', log=True,
-                      dashed=('threshold',)),
+                _plot(
+                    'Control value and position',
+                    ['CV', 'X1'],
+                    ['cv', 'x1'],
+                    ['--cv', '--x1'],
+                    done,
+                    '[1]',
+                    low=0.0,
+                    high=1.0,
+                    dashed=('CV',),
+                ),
+                _plot(
+                    'Residual against threshold',
+                    ['residual', 'threshold'],
+                    ['residual', 'threshold'],
+                    ['--residual', '--rho'],
+                    done,
+                    '[1/s]',
+                    log=True,
+                    dashed=('threshold',),
+                ),
                 _plot('Stem velocity', ['X2'], ['x2'], ['--velocity'], done, '[1/s]'),
             ]
         with ui.element('div').classes('stack'), card('Valve signature', 'input over position'):
             names = ('before the alarm', 'since the alarm') if alarms else ('whole recording',)
-            cloud = Plot(signature_plot(names), ['--before', '--now'][-len(names):],
-                         'valve signature: force over position', 'plot tall')
+            cloud = Plot(
+                signature_plot(names),
+                ['--before', '--now'][-len(names) :],
+                'valve signature: force over position',
+                'plot tall',
+            )
     with ui.element('section').classes('card w-full'):
         ui.html('<div class="head"><h2>Transitions</h2></div>', sanitize=False)
-        ui.html(markup.history_table(done.rows()[:500], name=False),
-                sanitize=False).classes('w-full')
+        ui.html(markup.history_table(done.rows()[:500], name=False), sanitize=False).classes(
+            'w-full'
+        )
     message: dict[int, Any] = {}
     for plot, series in plots:
         message[plot.id] = {'all': True, 'series': series, 'from': [], 'range': done.range}
@@ -112,9 +162,17 @@ def _show(done: Playback, mode: str) -> None:
     ui.run_javascript(f'damadics.push({json.dumps(message, separators=(",", ":"))})')
 
 
-def _plot(title: str, names: list[str], curves: list[str], colors: list[str], done: Playback,
-          unit: str, **options: Any) -> tuple[Plot, list[Any]]:
+def _plot(
+    title: str,
+    names: list[str],
+    curves: list[str],
+    colors: list[str],
+    done: Playback,
+    unit: str,
+    **options: Any,
+) -> tuple[Plot, list[Any]]:
     with card(title):
-        plot = Plot(time_plot(names, unit, zoom=True, **options), colors, f'{title} over time',
-                    'plot zoom')
+        plot = Plot(
+            time_plot(names, unit, zoom=True, **options), colors, f'{title} over time', 'plot zoom'
+        )
     return plot, [done.curves[name] for name in curves]

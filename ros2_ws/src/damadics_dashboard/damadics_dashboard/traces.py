@@ -39,7 +39,7 @@ class Trace:
 
         :return: a view that the next `extend` may overwrite.
         """
-        return self._data[self._from:self._to]
+        return self._data[self._from : self._to]
 
     @property
     def newest(self) -> int:
@@ -60,13 +60,13 @@ class Trace:
         jumps = np.flatnonzero(np.diff(stamps, prepend=max(self.newest, stamps[0])) < 0)
         if len(jumps):
             self._from = self._to = 0
-            rows = rows[jumps[-1]:]
-        rows = rows[-self._capacity:]
+            rows = rows[jumps[-1] :]
+        rows = rows[-self._capacity :]
         if self._to + len(rows) > len(self._data):
-            kept = self.rows[-(self._capacity - len(rows)):] if len(rows) < self._capacity else []
-            self._data[:len(kept)] = kept
+            kept = self.rows[-(self._capacity - len(rows)) :] if len(rows) < self._capacity else []
+            self._data[: len(kept)] = kept
             self._from, self._to = 0, len(kept)
-        self._data[self._to:self._to + len(rows)] = rows
+        self._data[self._to : self._to + len(rows)] = rows
         self._to += len(rows)
         oldest = self._data['stamp'][self._to - 1] - self._span
         self._from = max(self._from, self._to - self._capacity)
@@ -80,11 +80,12 @@ class Trace:
         :return: a view as `rows`.
         """
         rows = self.rows
-        return rows[int(np.searchsorted(rows['stamp'], stamp)):]
+        return rows[int(np.searchsorted(rows['stamp'], stamp)) :]
 
 
-def envelope(stamp: NDArray[np.int64], value: NDArray[np.float64], width: int, *,
-             largest: bool = False) -> Points:
+def envelope(
+    stamp: NDArray[np.int64], value: NDArray[np.float64], width: int, *, largest: bool = False
+) -> Points:
     """
     Thin a signal out to the least and the greatest value of every interval, in their order.
 

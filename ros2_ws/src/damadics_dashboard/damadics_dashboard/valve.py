@@ -76,10 +76,17 @@ class Valve:
         self.lost = 0
         self.batches = {
             'measurement': Batch('damadics_msgs/msg/Measurement', {'cv': 'cv', 'x1': 'x1'}),
-            'estimate': Batch('damadics_msgs/msg/Estimate', {
-                'x2': 'x2', 'residual': 'xi2', 'u': 'u', 'x': 'x1', 'progress': 'progress',
-                'phase': 'phase',
-            }),
+            'estimate': Batch(
+                'damadics_msgs/msg/Estimate',
+                {
+                    'x2': 'x2',
+                    'residual': 'xi2',
+                    'u': 'u',
+                    'x': 'x1',
+                    'progress': 'progress',
+                    'phase': 'phase',
+                },
+            ),
             'threshold': Batch('damadics_msgs/msg/Float64Stamped', {'rho': 'data'}),
         }
         self.traces = {
@@ -141,7 +148,7 @@ class Valve:
         """Close one second of the small curve on the tile."""
         rows, limits = self.traces['estimate'].rows, self.traces['threshold'].rows
         if len(rows) and len(limits):
-            recent = rows[-max(int(1.0 / max(self.period, 1e-3)), 1):]
+            recent = rows[-max(int(1.0 / max(self.period, 1e-3)), 1) :]
             if limits['rho'][-1] > 0.0:
                 self.peak = max(self.peak, float(recent['residual'].max()) / limits['rho'][-1])
         self.ratios.append(self.peak)
@@ -194,11 +201,15 @@ class Valve:
         letter, words = NE107.get(flag.level, ('C', 'function check'))
         if flag.state in ALARMS:
             active = flag.state == FaultFlag.STATE_ALARM
-            return Condition(letter or 'M', words.capitalize(),
-                             'fault present' if active else 'fault has gone, alarm latched')
+            return Condition(
+                letter or 'M',
+                words.capitalize(),
+                'fault present' if active else 'fault has gone, alarm latched',
+            )
         if flag.state == FaultFlag.STATE_LEARNING:
-            return Condition('learn', 'Learning',
-                             f'{100.0 * self.progress:.0f} % of the fault-free reference')
+            return Condition(
+                'learn', 'Learning', f'{100.0 * self.progress:.0f} % of the fault-free reference'
+            )
         return Condition('ok', 'Healthy', 'monitoring, no alarm')
 
     def alarm(self) -> Alarm | None:
@@ -221,20 +232,29 @@ class Valve:
         told = [e for e in mine if e['transition'] in (FaultEvent.RAISED, FaultEvent.CHANGED)]
         cleared = bool(mine) and FaultEvent.CLEARED in (e['transition'] for e in mine)
         state = {FaultFlag.STATE_ALARM: 'active', FaultFlag.STATE_LATCHED: 'returned'}.get(
-            flag.state, 'returned' if cleared else 'active')
+            flag.state, 'returned' if cleared else 'active'
+        )
         known = self.diagnostics.get('detector', {}).get('Acknowledged') == 'True'
         onset = flag.onset.sec * NANO + flag.onset.nanosec
         evidence = dict(told[-1]) if told else {}
         if evidence and state == 'active':  # the event tells how it was then
             stamp = flag.header.stamp.sec * NANO + flag.header.stamp.nanosec
-            evidence |= {'residual': flag.residual, 'threshold': flag.threshold,
-                         'duration': max(stamp - onset, 0) / NANO}
+            evidence |= {
+                'residual': flag.residual,
+                'threshold': flag.threshold,
+                'duration': max(stamp - onset, 0) / NANO,
+            }
             if flag.threshold > 0.0:
                 now = flag.residual / flag.threshold
                 evidence['ratio'] = max(evidence.get('ratio') or 0.0, now)
-        return Alarm(flag.occurrence, flag.level,
-                     'shelved' if flag.state == FaultFlag.STATE_SHELVED else state,
-                     known or flag.occurrence in self.acknowledged, onset, evidence)
+        return Alarm(
+            flag.occurrence,
+            flag.level,
+            'shelved' if flag.state == FaultFlag.STATE_SHELVED else state,
+            known or flag.occurrence in self.acknowledged,
+            onset,
+            evidence,
+        )
 
 
 def age(seconds: float | None) -> str:

@@ -42,9 +42,12 @@ def valve_page(watcher: Watcher, address: str) -> None:
     valve = watcher.valves.get(name)
     if valve is None:
         with frame('Unknown valve', '', watcher):
-            ui.html(f'<div class="card"><h1>No valve {escape(name)}</h1><p class="sub">It has not '
-                    'been seen since the dashboard started. <a href="/"><u>All valves</u></a></p>'
-                    '</div>', sanitize=False)
+            ui.html(
+                f'<div class="card"><h1>No valve {escape(name)}</h1><p class="sub">It has not '
+                'been seen since the dashboard started. <a href="/"><u>All valves</u></a></p>'
+                '</div>',
+                sanitize=False,
+            )
         return
     watcher.want(name)
     with frame(valve.title, '', watcher):
@@ -59,14 +62,22 @@ class _Page:
         self._valve = valve
         self._second = 0
         with ui.element('div').classes('row w-full'):
-            ui.html('<h1><a href="/" class="sub" aria-label="back to the fleet">Fleet&nbsp;/</a> '
-                    f'{escape(valve.title)}</h1>', sanitize=False)
+            ui.html(
+                '<h1><a href="/" class="sub" aria-label="back to the fleet">Fleet&nbsp;/</a> '
+                f'{escape(valve.title)}</h1>',
+                sanitize=False,
+            )
             ui.element('span').classes('spacer')
-            window = ui.toggle(WINDOWS, value=60, on_change=lambda e: self._show(e.value)).props(
-                'no-caps dense unelevated padding="4px 12px" aria-label="time shown"'
-            ).classes('seg')
-            self._hold = ui.button(icon='pause', on_click=self._pause, color=None).props(
-                'flat round dense aria-label="pause the plots"').style('color: var(--muted)')
+            window = (
+                ui.toggle(WINDOWS, value=60, on_change=lambda e: self._show(e.value))
+                .props('no-caps dense unelevated padding="4px 12px" aria-label="time shown"')
+                .classes('seg')
+            )
+            self._hold = (
+                ui.button(icon='pause', on_click=self._pause, color=None)
+                .props('flat round dense aria-label="pause the plots"')
+                .style('color: var(--muted)')
+            )
             valve_buttons(watcher, valve)
         self._banner = ui.html('', sanitize=False).classes('w-full')
         self._grid = ui.element('div').classes('grid')
@@ -93,19 +104,31 @@ class _Page:
         traces = self._valve.traces
         curves: dict[int, list[Curve]] = {}
         with card('Control value and position', 'fractions of the stroke, 1 = closed'):
-            plot = Plot(time_plot(['CV', 'X1'], '[1]', low=0.0, high=1.0, dashed=('CV',)),
-                        ['--cv', '--x1'], 'control value and position over time')
-            curves[plot.id] = [Curve(traces['measurement'], 'cv'),
-                               Curve(traces['measurement'], 'x1')]
+            plot = Plot(
+                time_plot(['CV', 'X1'], '[1]', low=0.0, high=1.0, dashed=('CV',)),
+                ['--cv', '--x1'],
+                'control value and position over time',
+            )
+            curves[plot.id] = [
+                Curve(traces['measurement'], 'cv'),
+                Curve(traces['measurement'], 'x1'),
+            ]
         with card('Residual against threshold', 'the largest of each interval') as head:
             with head:
-                self._scale = ui.switch('logarithmic', value=True, on_change=self._rescale).props(
-                    'dense').classes('scale')
+                self._scale = (
+                    ui.switch('logarithmic', value=True, on_change=self._rescale)
+                    .props('dense')
+                    .classes('scale')
+                )
             self._residual = Plot(
                 time_plot(['residual', 'threshold'], '[1/s]', log=True, dashed=('threshold',)),
-                ['--residual', '--rho'], 'velocity residual and threshold over time')
-            curves[self._residual.id] = [Curve(traces['estimate'], 'residual', largest=True),
-                                         Curve(traces['threshold'], 'rho', largest=True)]
+                ['--residual', '--rho'],
+                'velocity residual and threshold over time',
+            )
+            curves[self._residual.id] = [
+                Curve(traces['estimate'], 'residual', largest=True),
+                Curve(traces['threshold'], 'rho', largest=True),
+            ]
         with card('Stem velocity', 'strokes per second'):
             plot = Plot(time_plot(['X2'], '[1/s]'), ['--velocity'], 'stem velocity over time')
             curves[plot.id] = [Curve(traces['estimate'], 'x2')]
@@ -113,9 +136,12 @@ class _Page:
 
     def _signature_plot(self) -> Plot:
         with card('Valve signature', 'input over position, means of 0.1 s'):
-            return Plot(signature_plot(('fault-free', f'last {SIGNATURE_NOW:.0f} s')),
-                        ['--before', '--now'], 'valve signature: force over position',
-                        'plot tall')
+            return Plot(
+                signature_plot(('fault-free', f'last {SIGNATURE_NOW:.0f} s')),
+                ['--before', '--now'],
+                'valve signature: force over position',
+                'plot tall',
+            )
 
     def _show(self, window: float) -> None:
         self._feed.window = float(window)

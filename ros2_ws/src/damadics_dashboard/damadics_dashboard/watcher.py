@@ -96,8 +96,9 @@ class Watcher:
         """
         return _topic(valve, service) in self.services
 
-    async def call(self, valve: str, service: str, kind: Any, patience: float = 5.0,
-                   **request: Any) -> tuple[bool, str]:
+    async def call(
+        self, valve: str, service: str, kind: Any, patience: float = 5.0, **request: Any
+    ) -> tuple[bool, str]:
         """
         Call a service of a valve.
 
@@ -122,8 +123,12 @@ class Watcher:
         def send() -> None:
             if name not in self._clients:
                 self._clients[name] = self._node.create_client(kind, name)
-            self._send(name, kind.Request(**request), patience,
-                       lambda response: loop.call_soon_threadsafe(settle, response))
+            self._send(
+                name,
+                kind.Request(**request),
+                patience,
+                lambda response: loop.call_soon_threadsafe(settle, response),
+            )
 
         self._calls.append(send)
         try:
@@ -185,9 +190,10 @@ class Watcher:
         self.services = {name for name, _ in self._node.get_service_names_and_types()}
         for topic, kinds in self._node.get_topic_names_and_types():
             parent, _, name = topic.rpartition('/')
-            if ((name == 'fault_flag' and FLAG_TYPE in kinds) or (
-                name == 'measurement' and MEASUREMENT_TYPE in kinds
-            )) and self._node.count_publishers(topic):
+            if (
+                (name == 'fault_flag' and FLAG_TYPE in kinds)
+                or (name == 'measurement' and MEASUREMENT_TYPE in kinds)
+            ) and self._node.count_publishers(topic):
                 self._meet(parent.lstrip('/'))
         now = time.monotonic()
         alive = [v for v in self.valves if (v, 'fault_flag') in self._subscriptions]
@@ -229,7 +235,11 @@ class Watcher:
             valve.lost += event.total_count_change
 
         self._subscriptions[name, topic] = self._node.create_subscription(
-            FAST[topic], _topic(name, topic), valve.batches[topic].take, qos.SAMPLES, raw=True,
+            FAST[topic],
+            _topic(name, topic),
+            valve.batches[topic].take,
+            qos.SAMPLES,
+            raw=True,
             event_callbacks=SubscriptionEventCallbacks(message_lost=lost),
         )
 
@@ -258,8 +268,20 @@ def _plain(valve: str, message: FaultEvent) -> dict[str, Any]:
     for name in ('stamp', 'onset'):
         time_of = message.header.stamp if name == 'stamp' else message.onset
         row[name] = time_of.sec * 1_000_000_000 + time_of.nanosec
-    for name in ('transition', 'occurrence', 'level', 'residual', 'threshold', 'ratio', 'duration',
-                 'cause', 'confidence', 'strength', 'text', 'advice'):
+    for name in (
+        'transition',
+        'occurrence',
+        'level',
+        'residual',
+        'threshold',
+        'ratio',
+        'duration',
+        'cause',
+        'confidence',
+        'strength',
+        'text',
+        'advice',
+    ):
         value = getattr(message, name)
         row[name] = None if isinstance(value, float) and not math.isfinite(value) else value
     return row

@@ -117,12 +117,16 @@ def nominal_unit(campaign: Campaign, seed: int) -> list[dict[str, Any]]:
         started = time.perf_counter()
         detector.fit(hour)
         statistic = debounced(detector.statistic(day), campaign.debounce)
-        results.append({
-            'kind': 'nominal', 'detector': name, 'seed': seed,
-            'hourly_max': statistic.reshape(24, -1).max(axis=1).tolist(),
-            'seconds': round(time.perf_counter() - started, 3),
-            'settings_hash': campaign.settings_hash(name),
-        })  # fmt: skip
+        results.append(
+            {
+                'kind': 'nominal',
+                'detector': name,
+                'seed': seed,
+                'hourly_max': statistic.reshape(24, -1).max(axis=1).tolist(),
+                'seconds': round(time.perf_counter() - started, 3),
+                'settings_hash': campaign.settings_hash(name),
+            }
+        )
     return results
 
 
@@ -139,9 +143,10 @@ def limits(campaign: Campaign, nominal: Sequence[dict[str, Any]]) -> dict[str, f
             found[name] = 1.0
             continue
         peaks = [
-            max(r['hourly_max']) for r in nominal
+            max(r['hourly_max'])
+            for r in nominal
             if r['detector'] == name and r['seed'] < NOMINAL_SEED
-        ]  # fmt: skip
+        ]
         found[name] = MARGIN * max(peaks)
     return found
 
@@ -169,14 +174,16 @@ def scenario_unit(
         decision = np.maximum.accumulate(ratio >= 1.0)  # latched, as an alarm is
         t = samples[:, 0]
         result: dict[str, Any] = {
-            'kind': 'scenario', 'scenario': name, 'fault': scenario.fault, 'seed': seed,
-            'detector': detector_name, 'limit': limit[detector_name],
+            'kind': 'scenario',
+            'scenario': name,
+            'fault': scenario.fault,
+            'seed': seed,
+            'detector': detector_name,
+            'limit': limit[detector_name],
             'settings_hash': campaign.settings_hash(detector_name),
-            'indices': _plain(
-                asdict(decision_indices(t, decision, scenario.zones, strength))
-            ),
+            'indices': _plain(asdict(decision_indices(t, decision, scenario.zones, strength))),
             'crossings': _crossings(t, ratio),
-        }  # fmt: skip
+        }
         if isinstance(detector, Scada) and not detector.calibrated:
             result['test'] = detector.first_test()
             result['signature'] = detector.signature()
@@ -240,11 +247,15 @@ def isolation_result(
         'diagnoses': diagnoses,
         'right_group': settled['group'] == group_of(scenario.fault),
         'right_first': settled['ranking'][0][0] == scenario.fault,
-        'indices': _plain({
-            **twins, 'r_mi': misisolation_rate(t, complementary, scenario.zones),
-            'dacc_tm': dacc_tm, 'dacc': dacc,
-        }),
-    }  # fmt: skip
+        'indices': _plain(
+            {
+                **twins,
+                'r_mi': misisolation_rate(t, complementary, scenario.zones),
+                'dacc_tm': dacc_tm,
+                'dacc': dacc,
+            }
+        ),
+    }
 
 
 def _diagnosis(isolation: Isolation) -> dict[str, Any]:

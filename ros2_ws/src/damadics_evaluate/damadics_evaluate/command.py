@@ -20,7 +20,8 @@ examples:
   more of it; what is there is kept:
     ros2 run damadics_evaluate evaluate run --out results --seeds 20 --nominal-days 40
   some of it, a strength of your own; on a Dask cluster:
-    ros2 run damadics_evaluate evaluate run --out results --scenarios f4_I f12@-0.37 --detectors scada
+    ros2 run damadics_evaluate evaluate run --out results --scenarios f4_I f12@-0.37 \
+        --detectors scada
     ros2 run damadics_evaluate evaluate run --out results --scheduler tcp://head:8786
   the paper's two experiments, all detectors:
     ros2 run damadics_evaluate evaluate paper results
@@ -43,27 +44,42 @@ def _parser() -> argparse.ArgumentParser:
     run = commands.add_parser('run', help='run a campaign; results already there are kept')
     run.add_argument('--out', type=Path, default=Path('results'), help='directory (results)')
     run.add_argument(
-        '--scenarios', nargs='+', default=list(SCENARIOS), metavar='NAME',
+        '--scenarios',
+        nargs='+',
+        default=list(SCENARIOS),
+        metavar='NAME',
         help='f1_S .. f19_B, or fN@STRENGTH for an abrupt fault of any strength (all 44)',
-    )  # fmt: skip
+    )
     run.add_argument(
-        '--detectors', nargs='+', default=list(DETECTORS), metavar='NAME',
+        '--detectors',
+        nargs='+',
+        default=list(DETECTORS),
+        metavar='NAME',
         help=f'{", ".join(DETECTORS)} (all)',
-    )  # fmt: skip
+    )
     run.add_argument('--seeds', type=int, default=1, metavar='N', help='runs per scenario (1)')
     run.add_argument('--first-seed', type=int, default=0, metavar='N', help='first seed (0)')
     run.add_argument(
-        '--calibration-days', type=int, default=3, metavar='N',
+        '--calibration-days',
+        type=int,
+        default=3,
+        metavar='N',
         help='fault-free days that set the limits of the baselines (3)',
-    )  # fmt: skip
+    )
     run.add_argument(
-        '--nominal-days', type=int, default=0, metavar='N',
+        '--nominal-days',
+        type=int,
+        default=0,
+        metavar='N',
         help='further fault-free days on which false alarms are counted (0)',
-    )  # fmt: skip
+    )
     run.add_argument(
-        '--isolated-seeds', type=int, default=5, metavar='N',
+        '--isolated-seeds',
+        type=int,
+        default=5,
+        metavar='N',
         help='seeds for which the faults are also isolated (5)',
-    )  # fmt: skip
+    )
     run.add_argument('--debounce', type=int, default=1, metavar='N', help='samples (1)')
     run.add_argument('--jobs', type=int, metavar='N', help='processes (one per core)')
     run.add_argument('--scheduler', metavar='ADDRESS', help='Dask scheduler, tcp://host:port')
@@ -139,14 +155,18 @@ def _compare(arguments: argparse.Namespace) -> None:
     rows = compare(first, second)
     if not rows:
         raise ValueError(f'{arguments.a} and {arguments.b} share no scenario and detector')
-    print(f'{"scenario":10} {"detector":14} {"found a":>8} {"found b":>8} '
-          f'{"t_dt a":>8} {"t_dt b":>8} {"earlier":>8} {"later":>6} {"p":>6}')  # fmt: skip
+    print(
+        f'{"scenario":10} {"detector":14} {"found a":>8} {"found b":>8} '
+        f'{"t_dt a":>8} {"t_dt b":>8} {"earlier":>8} {"later":>6} {"p":>6}'
+    )
     for row in rows:
         if row['earlier_in_b'] or row['later_in_b'] or row['detected_a'] != row['detected_b']:
-            print(f'{row["scenario"]:10} {row["detector"]:14} {row["detected_a"]:8.0%} '
-                  f'{row["detected_b"]:8.0%} {_seconds(row["t_dt_a"]):>8} '
-                  f'{_seconds(row["t_dt_b"]):>8} {row["earlier_in_b"]:8} '
-                  f'{row["later_in_b"]:6} {row["p"]:6.2f}')  # fmt: skip
+            print(
+                f'{row["scenario"]:10} {row["detector"]:14} {row["detected_a"]:8.0%} '
+                f'{row["detected_b"]:8.0%} {_seconds(row["t_dt_a"]):>8} '
+                f'{_seconds(row["t_dt_b"]):>8} {row["earlier_in_b"]:8} '
+                f'{row["later_in_b"]:6} {row["p"]:6.2f}'
+            )
     same = sum(not r['earlier_in_b'] and not r['later_in_b'] for r in rows)
     print(f'{same} of {len(rows)} pairs without a difference; "earlier", "later": seeds of b')
     settings = [
@@ -161,5 +181,3 @@ def _compare(arguments: argparse.Namespace) -> None:
 
 def _seconds(value: float) -> str:
     return f'{value:.0f}' if math.isfinite(value) else '-'
-
-

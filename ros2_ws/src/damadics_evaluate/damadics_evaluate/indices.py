@@ -82,8 +82,15 @@ class DecisionIndices:
 
     def as_isolation(self) -> dict[str, float | bool]:
         """Return the same figures under the names of the isolation twins."""
-        twin = {'t_dt': 't_it', 't_dm': 't_im', 't_drt': 't_irt', 't_drm': 't_irm',
-                'r_fd': 'r_fi', 'r_td': 'r_ti', 'f_sd': 'f_si'}  # fmt: skip
+        twin = {
+            't_dt': 't_it',
+            't_dm': 't_im',
+            't_drt': 't_irt',
+            't_drm': 't_irm',
+            'r_fd': 'r_fi',
+            'r_td': 'r_ti',
+            'f_sd': 'f_si',
+        }
         return {twin.get(name, name): value for name, value in asdict(self).items()}
 
 
@@ -196,9 +203,7 @@ def misisolation_rate(t: ArrayLike, complementary: ArrayLike, zones: Zones) -> f
     return high_time(t, complementary, zones.t_on, zones.t_hor) / (zones.t_hor - zones.t_on)
 
 
-def diagnosis_accuracy(
-    diagnoses: Sequence[Sequence[int]], true_fault: int
-) -> tuple[float, float]:
+def diagnosis_accuracy(diagnoses: Sequence[Sequence[int]], true_fault: int) -> tuple[float, float]:
     """
     Return dacc_tm and dacc of a sequence of elementary diagnoses.
 

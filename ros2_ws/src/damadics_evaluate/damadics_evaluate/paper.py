@@ -32,9 +32,11 @@ CALIBRATION = 3  # fault-free runs of the paper's profile that set the limits of
 MARGIN = 1.1
 REPEATS = 8  # of the paper's CV profile, for the hour the SCADA-rate monitor learns from
 COLUMNS = (
-    'friction: detected at (s)', 'spring: detected at (s)', 'alarms before the fault',
+    'friction: detected at (s)',
+    'spring: detected at (s)',
+    'alarms before the fault',
     'alarms in the fault-free run',
-)  # fmt: skip
+)
 TEXT = (
     'CV profile of Figs. 5(f) and 6(f), faults at 70 s. Paper mode at 400 Hz without noise, as '
     'published: 81.12 and 70.005 s. All others with benchmark noise at 200 Hz; the SCADA-rate '
@@ -88,8 +90,12 @@ def write_paper(directory: Path) -> Path:
         rows += row
     rows += _states(noisy, quiet)
     file = directory / 'paper.json'
-    content = {'text': TEXT, 'columns': COLUMNS, 'rows': [row.cells() for row in rows],
-               'figures': '\n'.join(figures)}  # fmt: skip
+    content = {
+        'text': TEXT,
+        'columns': COLUMNS,
+        'rows': [row.cells() for row in rows],
+        'figures': '\n'.join(figures),
+    }
     directory.mkdir(parents=True, exist_ok=True)
     file.write_text(json.dumps(content), encoding='utf-8')
     return file

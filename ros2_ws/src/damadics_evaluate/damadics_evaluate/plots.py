@@ -62,26 +62,38 @@ def delay_curves(results: Sequence[Result], detectors: Sequence[str]) -> str:
     def draw(_: Any, axis: Any) -> None:
         for name, (colour, width, dash) in _colours(detectors).items():
             values = sorted(
-                t for (scenario, detector), group in grouped.items()
-                if detector == name and not unobservable(scenario) for t in delays(group)
-            )  # fmt: skip
+                t
+                for (scenario, detector), group in grouped.items()
+                if detector == name and not unobservable(scenario)
+                for t in delays(group)
+            )
             if not values:
                 continue
             share = np.arange(1, len(values) + 1) / len(values)
             x = [max(t, 0.7) for t in values if math.isfinite(t)]
-            axis.step([0.5, *x, 1e5], [0.0, *share[: len(x)], share[len(x) - 1] if x else 0.0],
-                      where='post', color=colour, lw=width, ls=dash, label=title_of(name),
-                      zorder=5 if name == 'scada' else 2)  # fmt: skip
-        axis.set(xscale='log', xlim=(0.5, 1e5), ylim=(0, 1.02), xlabel='detection delay t_dt (s)',
-                 ylabel='share of runs detected')  # fmt: skip
+            axis.step(
+                [0.5, *x, 1e5],
+                [0.0, *share[: len(x)], share[len(x) - 1] if x else 0.0],
+                where='post',
+                color=colour,
+                lw=width,
+                ls=dash,
+                label=title_of(name),
+                zorder=5 if name == 'scada' else 2,
+            )
+        axis.set(
+            xscale='log',
+            xlim=(0.5, 1e5),
+            ylim=(0, 1.02),
+            xlabel='detection delay t_dt (s)',
+            ylabel='share of runs detected',
+        )
         axis.legend(loc='upper left', bbox_to_anchor=(1.0, 1.0))
 
     return _draw((9.0, 4.6), draw)
 
 
-def operating_curves(
-    results: Sequence[Result], limits: dict[str, float], first_seed: int
-) -> str:
+def operating_curves(results: Sequence[Result], limits: dict[str, float], first_seed: int) -> str:
     """Return missed runs against hours with a false exceedance per day, over the limit."""
 
     def draw(_: Any, axis: Any) -> None:
@@ -90,12 +102,23 @@ def operating_curves(
                 continue
             curve = operating_curve(results, name, limits[name], first_seed)
             rate = np.maximum(np.array(curve['false_per_day']), 0.02)
-            axis.plot(rate, curve['missed'], color=colour, lw=width, ls=dash,
-                      label=title_of(name), zorder=5 if name == 'scada' else 2)  # fmt: skip
+            axis.plot(
+                rate,
+                curve['missed'],
+                color=colour,
+                lw=width,
+                ls=dash,
+                label=title_of(name),
+                zorder=5 if name == 'scada' else 2,
+            )
             at = int(np.argmin(np.abs(np.log(curve['factor']))))
             axis.plot(rate[at], curve['missed'][at], 'o', color=colour, ms=6)
-        axis.set(xscale='log', xlabel='hours per fault-free day with an exceedance (0: left edge)',
-                 ylabel='share of observable runs missed', ylim=(-0.02, 1.02))  # fmt: skip
+        axis.set(
+            xscale='log',
+            xlabel='hours per fault-free day with an exceedance (0: left edge)',
+            ylabel='share of observable runs missed',
+            ylim=(-0.02, 1.02),
+        )
         axis.legend(loc='upper left', bbox_to_anchor=(1.0, 1.0))
 
     return _draw((9.0, 4.6), draw)
@@ -119,12 +142,23 @@ def detectability(results: Sequence[Result], detector: str = 'scada') -> str:
             x = np.array([p[0] for p in pairs])
             y = np.array([max(p[1], 0.7) if math.isfinite(p[1]) else missed for p in pairs])
             colour = OTHERS[i % len(OTHERS)]
-            axis.plot(x, y, '-' if i < len(OTHERS) else '--', color=colour, label=f'f{fault}',
-                      marker='o', ms=3.5)  # fmt: skip
+            axis.plot(
+                x,
+                y,
+                '-' if i < len(OTHERS) else '--',
+                color=colour,
+                label=f'f{fault}',
+                marker='o',
+                ms=3.5,
+            )
         axis.axhline(missed, color=GREY, lw=0.8, ls=':')
         axis.text(1.0, missed, ' not in 600 s', va='center', color=GREY, fontsize=8)
-        axis.set(xscale='log', yscale='log', xlabel='strength of the abrupt fault',
-                 ylabel='median delay (s)')  # fmt: skip
+        axis.set(
+            xscale='log',
+            yscale='log',
+            xlabel='strength of the abrupt fault',
+            ylabel='median delay (s)',
+        )
         axis.legend(ncol=2, loc='upper left', bbox_to_anchor=(1.02, 1.0))
 
     return _draw((8.6, 4.4), draw)
@@ -142,17 +176,22 @@ def heat_map(results: Sequence[Result]) -> str:
     def draw(figure: Any, axis: Any) -> None:
         values = np.array([rows[name] for name in names])
         size = np.log10(np.maximum(np.abs(values), floor) / floor)
-        image = axis.imshow(np.sign(values) * size, cmap='RdBu_r', aspect='auto', vmin=-3.4,
-                            vmax=3.4)  # fmt: skip
+        image = axis.imshow(
+            np.sign(values) * size, cmap='RdBu_r', aspect='auto', vmin=-3.4, vmax=3.4
+        )
         axis.set_xticks(range(len(SIGNATURE)), SIGNATURE)
         axis.set_yticks(range(len(names)), names, fontsize=7)
         axis.grid(False)
         axis.tick_params(length=0, top=True, labeltop=True, bottom=False, labelbottom=False)
         bar = figure.colorbar(image, ax=axis, shrink=0.5)
         ticks = [-3, -2, -1, 0, 1, 2, 3]
-        bar.set_ticks(ticks, labels=[
-            '0' if not k else f'{"-" if k < 0 else "+"}{floor * 10.0 ** abs(k):.2g}' for k in ticks
-        ])  # fmt: skip
+        bar.set_ticks(
+            ticks,
+            labels=[
+                '0' if not k else f'{"-" if k < 0 else "+"}{floor * 10.0 ** abs(k):.2g}'
+                for k in ticks
+            ],
+        )
 
     return _draw((7.0, 8.4), draw) if names else ''
 

@@ -95,41 +95,45 @@ def _content(campaign: Campaign, results: Sequence[Result]) -> dict[str, Any]:
     }
 
 
-def cards(rows: Sequence[dict[str, Any]], false_alarms: Sequence[dict[str, Any]]) -> list[
-    tuple[str, str]
-]:  # fmt: skip
+def cards(
+    rows: Sequence[dict[str, Any]], false_alarms: Sequence[dict[str, Any]]
+) -> list[tuple[str, str]]:
     """Return the headline figures of the monitor."""
     ours = {r['scenario']: r for r in rows if r['detector'] == 'scada'}
     always = sum(r['detected'] == r['runs'] for r in ours.values())
     found = [
         (f'{always} of {len(ours)}', 'scenarios found in every run'),
-        (f'{max((r["r_fd_max"] for r in ours.values()), default=math.nan):g}',
-         'largest false detection rate'),
-    ]  # fmt: skip
+        (
+            f'{max((r["r_fd_max"] for r in ours.values()), default=math.nan):g}',
+            'largest false detection rate',
+        ),
+    ]
     alarms = next((r for r in false_alarms if r['detector'] == 'scada'), None)
     if alarms:
-        found.append((f'{alarms["days_with_alarm"]} in {alarms["days"]}',
-                      'fault-free days with an alarm'))  # fmt: skip
+        found.append(
+            (f'{alarms["days_with_alarm"]} in {alarms["days"]}', 'fault-free days with an alarm')
+        )
     first, of = versus_baselines(rows, without=MODEL_BASED)
     against_all, _ = versus_baselines(rows, without=('scada',))
-    found.append((
-        f'{first} of {of}',
-        'found no later than by the best baseline '
-        f"({against_all} with thresholds on the monitor's own residuals counted as baselines)",
-    ))
+    found.append(
+        (
+            f'{first} of {of}',
+            'found no later than by the best baseline '
+            f"({against_all} with thresholds on the monitor's own residuals counted as baselines)",
+        )
+    )
     abrupt = [
-        r for r in ours.values()
+        r
+        for r in ours.values()
         if r['detected'] and case(r['scenario']).abrupt and not math.isnan(r['first_right'])
-    ]  # fmt: skip
+    ]
     if abrupt:
         share = sum(r['first_right'] for r in abrupt) / len(abrupt)
         found.append((f'{share:.0%}', 'abrupt faults named right, first in the ranking'))
     return found
 
 
-def versus_baselines(
-    rows: Sequence[dict[str, Any]], without: Sequence[str]
-) -> tuple[int, int]:
+def versus_baselines(rows: Sequence[dict[str, Any]], without: Sequence[str]) -> tuple[int, int]:
     """Return in how many of the detected scenarios the monitor is no later than any baseline."""
     ours = {r['scenario']: r['t_dt_median'] for r in rows if r['detector'] == 'scada'}
     best: dict[str, float] = {}
@@ -159,13 +163,19 @@ def shortfalls(rows: Sequence[dict[str, Any]]) -> list[str]:
             lines.append(f'{name}: false detections, r_fd up to {r["r_fd_max"]:.3f}.')
         rival = best.get(name, (math.inf, ''))
         if rival[0] < r['t_dt_median']:
-            lines.append(f'{name}: found after {_cell(r["t_dt_median"])} s, by the {rival[1]} '
-                         f'after {_cell(rival[0])} s.')  # fmt: skip
+            lines.append(
+                f'{name}: found after {_cell(r["t_dt_median"])} s, by the {rival[1]} '
+                f'after {_cell(rival[0])} s.'
+            )
         if r['detected'] and r['first_right'] < 1.0:
-            early = '' if case(name).abrupt else (
-                ', judged 600 s after the alarm: a fault that has only just become visible has '
-                'little shape'
-            )  # fmt: skip
+            early = (
+                ''
+                if case(name).abrupt
+                else (
+                    ', judged 600 s after the alarm: a fault that has only just become visible has '  # noqa: E501
+                    'little shape'
+                )
+            )
             lines.append(
                 f'{name}: named right in {r["first_right"]:.0%} of the runs that alarm, '
                 f'its group in {r["group_right"]:.0%}{early}.'
@@ -190,8 +200,16 @@ def _grid(rows: Sequence[dict[str, Any]], detectors: Sequence[str]) -> list[dict
             if 0 < r['detected'] < r['runs']:
                 text += f' ({r["detected"]}/{r["runs"]})'
             finite = math.isfinite(r['t_dt_median'])
-            cells.append((text, 'best' if finite and r['t_dt_median'] <= min(present)
-                          else '' if finite else 'miss'))  # fmt: skip
+            cells.append(
+                (
+                    text,
+                    'best'
+                    if finite and r['t_dt_median'] <= min(present)
+                    else ''
+                    if finite
+                    else 'miss',
+                )
+            )
         runs = max(by[scenario, d]['runs'] for d in detectors if (scenario, d) in by)
         grid.append({'scenario': scenario, 'runs': runs, 'cells': cells})
     return grid
@@ -238,33 +256,49 @@ def _cell(value: float) -> str:
 def _readme(content: dict[str, Any]) -> str:
     """Return the report's short form for a repository page."""
     lines = [
-        '# Results', '',
+        '# Results',
+        '',
         f'{content["scenarios"]} scenarios, {len(content["detectors"])} detectors, seeds '
         f'{content["seeds"]}; settings {content["settings_hash"]}. The whole report with curves, '
         'forms and figures: [index.html](index.html); every figure: [summary.csv](summary.csv).',
         '',
-        *(f'- **{figure}** {text}' for figure, text in content['cards']), '',
-        '## What is not detected or not isolated, and why', '',
-        *(f'- {line}' for line in content['shortfalls']), '',
-        '## Detection time, median t_dt in s', '',
+        *(f'- **{figure}** {text}' for figure, text in content['cards']),
+        '',
+        '## What is not detected or not isolated, and why',
+        '',
+        *(f'- {line}' for line in content['shortfalls']),
+        '',
+        '## Detection time, median t_dt in s',
+        '',
         '| scenario | runs | ' + ' | '.join(content['titles'].values()) + ' |',
         '|---|---|' + '---|' * len(content['titles']),
-    ]  # fmt: skip
+    ]
     for row in content['grid']:
         cells = (f'**{c[0]}**' if c[1] == 'best' else c[0] for c in row['cells'])
         lines.append(f'| {row["scenario"]} | {row["runs"]} | ' + ' | '.join(cells) + ' |')
     if content['paper']:
-        lines += ['', "## The paper's experiments", '', content['paper']['text'], '',
-                  '| detector | ' + ' | '.join(content['paper']['columns']) + ' |',
-                  '|---|' + '---|' * len(content['paper']['columns'])]  # fmt: skip
+        lines += [
+            '',
+            "## The paper's experiments",
+            '',
+            content['paper']['text'],
+            '',
+            '| detector | ' + ' | '.join(content['paper']['columns']) + ' |',
+            '|---|' + '---|' * len(content['paper']['columns']),
+        ]
         lines += ['| ' + ' | '.join(map(str, row)) + ' |' for row in content['paper']['rows']]
     if content['free']:
-        lines += ['', '## Isolation at other strengths', '',
-                  '| fault@strength | runs | median t_dt | group right | fault first |',
-                  '|---|---|---|---|---|']  # fmt: skip
+        lines += [
+            '',
+            '## Isolation at other strengths',
+            '',
+            '| fault@strength | runs | median t_dt | group right | fault first |',
+            '|---|---|---|---|---|',
+        ]
         lines += [
             f'| {r["scenario"]} | {r["runs"]} | {_cell(r["t_dt_median"])} | '
-            f'{_share(r["group_right"])} | {_share(r["first_right"])} |' for r in content['free']
-        ]  # fmt: skip
+            f'{_share(r["group_right"])} | {_share(r["first_right"])} |'
+            for r in content['free']
+        ]
     lines += ['', 'Made by `evaluate report`; edit nothing here.', '']
     return '\n'.join(lines)

@@ -103,9 +103,7 @@ def _missing(campaign: Campaign, name: str, seed: int, done: set[tuple[Any, ...]
 def _nominal_units(campaign: Campaign, done: set[tuple[Any, ...]]) -> Iterator[Unit]:
     for seed in range(CALIBRATION_SEED, CALIBRATION_SEED + campaign.calibration_days):
         part = _missing(campaign, 'nominal', seed, done)
-        part = replace(
-            part, detectors=tuple(d for d in part.detectors if DETECTORS[d].calibrated)
-        )
+        part = replace(part, detectors=tuple(d for d in part.detectors if DETECTORS[d].calibrated))
         if part.detectors:
             yield nominal_unit, (part, seed)
     for seed in range(NOMINAL_SEED, NOMINAL_SEED + campaign.nominal_days):

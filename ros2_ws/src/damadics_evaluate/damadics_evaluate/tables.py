@@ -20,8 +20,8 @@ NOT_OBSERVABLE = {
     'f8': 'scales a play of 1 % by at most 1.4: below the sensor noise',
     'f14': 'touches the chamber pressure only, which is not among the signals',
     'f16_S': 'the supply stays above what the strokes of this feed need; it shows with fast, '
-             'commanded strokes or with the chamber pressure',
-}  # fmt: skip
+    'commanded strokes or with the chamber pressure',
+}
 
 
 def unobservable(scenario: str) -> str:
@@ -48,9 +48,7 @@ def scenario_results(results: Sequence[Result]) -> dict[tuple[str, str], list[Re
 
 def delays(group: Sequence[Result]) -> list[float]:
     """Return t_dt of every run; infinity where the fault was not found."""
-    return [
-        math.inf if r['indices']['t_dt'] is None else r['indices']['t_dt'] for r in group
-    ]
+    return [math.inf if r['indices']['t_dt'] is None else r['indices']['t_dt'] for r in group]
 
 
 def summary(results: Sequence[Result]) -> list[dict[str, Any]]:
@@ -71,25 +69,30 @@ def summary(results: Sequence[Result]) -> list[dict[str, Any]]:
         found = [r['indices'] for r in group if r['indices']['t_dt'] is not None]
         tests = [r['test'] for r in group if r.get('test')]
         isolated = [r['isolation'] for r in group if r.get('isolation')]
-        rows.append({
-            'scenario': scenario,
-            'detector': detector,
-            'runs': len(group),
-            'detected': len(found),
-            't_dt_median': quantile(t_dt, 0.5),
-            't_dt_p90': quantile(t_dt, 0.9),
-            'f_sd': median(i['f_sd'] for i in found) if found else math.nan,
-            'r_fd_max': max(r['indices']['r_fd'] for r in group),
-            'r_td': median(r['indices']['r_td'] for r in group),
-            'first_test': max(set(tests), key=tests.count) if tests else '',
-            'group_right': _share(i['right_group'] for i in isolated),
-            'first_right': _share(i['right_first'] for i in isolated),
-            't_it': quantile(
-                (i['indices']['t_it'] if i['indices']['t_it'] is not None else math.inf
-                 for i in isolated), 0.5
-            ),
-            'why_not': unobservable(scenario),
-        })  # fmt: skip
+        rows.append(
+            {
+                'scenario': scenario,
+                'detector': detector,
+                'runs': len(group),
+                'detected': len(found),
+                't_dt_median': quantile(t_dt, 0.5),
+                't_dt_p90': quantile(t_dt, 0.9),
+                'f_sd': median(i['f_sd'] for i in found) if found else math.nan,
+                'r_fd_max': max(r['indices']['r_fd'] for r in group),
+                'r_td': median(r['indices']['r_td'] for r in group),
+                'first_test': max(set(tests), key=tests.count) if tests else '',
+                'group_right': _share(i['right_group'] for i in isolated),
+                'first_right': _share(i['right_first'] for i in isolated),
+                't_it': quantile(
+                    (
+                        i['indices']['t_it'] if i['indices']['t_it'] is not None else math.inf
+                        for i in isolated
+                    ),
+                    0.5,
+                ),
+                'why_not': unobservable(scenario),
+            }
+        )
     return rows
 
 
@@ -104,15 +107,17 @@ def write_csv(rows: Sequence[dict[str, Any]], file: Path) -> None:
         writer = csv.DictWriter(stream, list(rows[0]))
         writer.writeheader()
         for row in rows:
-            writer.writerow({
-                key: '' if isinstance(value, float) and not math.isfinite(value) else value
-                for key, value in row.items()
-            })  # fmt: skip
+            writer.writerow(
+                {
+                    key: '' if isinstance(value, float) and not math.isfinite(value) else value
+                    for key, value in row.items()
+                }
+            )
 
 
-def false_alarms(results: Sequence[Result], limit: dict[str, float], first_seed: int) -> list[
-    dict[str, Any]
-]:  # fmt: skip
+def false_alarms(
+    results: Sequence[Result], limit: dict[str, float], first_seed: int
+) -> list[dict[str, Any]]:
     """
     Return per detector the fault-free days and on how many of them it alarmed.
 
@@ -122,15 +127,20 @@ def false_alarms(results: Sequence[Result], limit: dict[str, float], first_seed:
     rows = []
     for detector, bound in limit.items():
         days = [
-            max(r['hourly_max']) / bound for r in results
+            max(r['hourly_max']) / bound
+            for r in results
             if r['kind'] == 'nominal' and r['detector'] == detector and r['seed'] >= first_seed
-        ]  # fmt: skip
+        ]
         if days:
-            rows.append({
-                'detector': detector, 'days': len(days),
-                'days_with_alarm': sum(d >= 1.0 for d in days),
-                'largest_ratio': max(days), 'median_ratio': median(days),
-            })  # fmt: skip
+            rows.append(
+                {
+                    'detector': detector,
+                    'days': len(days),
+                    'days_with_alarm': sum(d >= 1.0 for d in days),
+                    'largest_ratio': max(days),
+                    'median_ratio': median(days),
+                }
+            )
     return rows
 
 
@@ -143,15 +153,20 @@ def operating_curve(
     :return: `factor`, `false_per_day` (hours with an exceedance, per day, on fault-free days),
         `missed` (share of runs not detected in the horizon), `delay` (median over detected runs).
     """
-    hours = np.array([
-        r['hourly_max'] for r in results
-        if r['kind'] == 'nominal' and r['detector'] == detector and r['seed'] >= first_seed
-    ])  # fmt: skip
+    hours = np.array(
+        [
+            r['hourly_max']
+            for r in results
+            if r['kind'] == 'nominal' and r['detector'] == detector and r['seed'] >= first_seed
+        ]
+    )
     runs = [
-        r for r in results
-        if r['kind'] == 'scenario' and r['detector'] == detector
+        r
+        for r in results
+        if r['kind'] == 'scenario'
+        and r['detector'] == detector
         and not unobservable(r['scenario'])
-    ]  # fmt: skip
+    ]
     curve: dict[str, list[float]] = {
         name: [] for name in ('factor', 'false_per_day', 'missed', 'delay', 'false_before')
     }
@@ -189,18 +204,20 @@ def compare(first: Sequence[Result], second: Sequence[Result]) -> list[dict[str,
         later = sum(b[s] > a[s] for s in shared)
         earlier = sum(b[s] < a[s] for s in shared)
         ma, mb = quantile(a.values(), 0.5), quantile(b.values(), 0.5)
-        rows.append({
-            'scenario': key[0],
-            'detector': key[1],
-            'detected_a': sum(map(math.isfinite, a.values())) / len(a),
-            'detected_b': sum(map(math.isfinite, b.values())) / len(b),
-            't_dt_a': ma,
-            't_dt_b': mb,
-            'difference': mb - ma if math.isfinite(ma) and math.isfinite(mb) else math.nan,
-            'earlier_in_b': earlier,
-            'later_in_b': later,
-            'p': sign_test(earlier, later),
-        })  # fmt: skip
+        rows.append(
+            {
+                'scenario': key[0],
+                'detector': key[1],
+                'detected_a': sum(map(math.isfinite, a.values())) / len(a),
+                'detected_b': sum(map(math.isfinite, b.values())) / len(b),
+                't_dt_a': ma,
+                't_dt_b': mb,
+                'difference': mb - ma if math.isfinite(ma) and math.isfinite(mb) else math.nan,
+                'earlier_in_b': earlier,
+                'later_in_b': later,
+                'p': sign_test(earlier, later),
+            }
+        )
     return rows
 
 

@@ -32,10 +32,26 @@ DEVELOPMENT = {'S': 0.0, 'M': 0.0, 'B': 0.0, 'I': 86400.0}
 SHORT_DEVELOPMENT = {4: 3600.0, 13: 900.0, 17: 3600.0}
 CACHE_VARIABLE = 'DAMADICS_FD_CACHE'
 STANDARD = {
-    1: 'SMB', 2: 'BI', 3: 'I', 4: 'I', 5: 'I', 6: 'I', 7: 'SMB', 8: 'SMB', 9: 'I', 10: 'SMB',
-    11: 'BI', 12: 'SMB', 13: 'SMBI', 14: 'SMB', 15: 'B', 16: 'SMB', 17: 'BI', 18: 'SMBI',
+    1: 'SMB',
+    2: 'BI',
+    3: 'I',
+    4: 'I',
+    5: 'I',
+    6: 'I',
+    7: 'SMB',
+    8: 'SMB',
+    9: 'I',
+    10: 'SMB',
+    11: 'BI',
+    12: 'SMB',
+    13: 'SMBI',
+    14: 'SMB',
+    15: 'B',
+    16: 'SMB',
+    17: 'BI',
+    18: 'SMBI',
     19: 'SMB',
-}  # fmt: skip
+}
 SCENARIOS = tuple(f'f{fault}_{mode}' for fault, modes in STANDARD.items() for mode in modes)
 
 

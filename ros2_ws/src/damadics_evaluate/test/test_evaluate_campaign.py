@@ -117,11 +117,19 @@ def test_debounce_wants_consecutive_samples():
 def result(scenario, detector, seed, t_dt):
     found = math.isfinite(t_dt)
     return {
-        'kind': 'scenario', 'scenario': scenario, 'detector': detector, 'seed': seed,
-        'settings_hash': detector, 'crossings': [900.0 + t_dt if found else None] * 33,
-        'indices': {'t_dt': t_dt if found else None, 'r_fd': 0.0, 'r_td': 0.5,
-                    'f_sd': 0.25 if found else None},
-    }  # fmt: skip
+        'kind': 'scenario',
+        'scenario': scenario,
+        'detector': detector,
+        'seed': seed,
+        'settings_hash': detector,
+        'crossings': [900.0 + t_dt if found else None] * 33,
+        'indices': {
+            't_dt': t_dt if found else None,
+            'r_fd': 0.0,
+            'r_td': 0.5,
+            'f_sd': 0.25 if found else None,
+        },
+    }
 
 
 def test_results_of_other_settings_give_way_to_newer_ones(tmp_path):
@@ -194,16 +202,25 @@ def test_report_and_compare_commands(tmp_path, capsys, spring_results):
         directory = tmp_path / name
         directory.mkdir()
         days = [
-            {'kind': 'nominal', 'detector': d, 'seed': CALIBRATION_SEED,
-             'settings_hash': Campaign().settings_hash(d), 'hourly_max': [1.0] * 24}
+            {
+                'kind': 'nominal',
+                'detector': d,
+                'seed': CALIBRATION_SEED,
+                'settings_hash': Campaign().settings_hash(d),
+                'hourly_max': [1.0] * 24,
+            }
             for d in ('fixed', 'fixed_r1')
-        ]  # fmt: skip
+        ]
         lines = [json.dumps(r) for r in (*spring_results, *days)]
         (directory / 'results.jsonl').write_text('\n'.join(lines))
         stated = {
-            'scenarios': ['f11_B'], 'detectors': ['scada', 'fixed', 'fixed_r1'], 'seeds': [3],
-            'calibration_days': 1, 'nominal_days': 0, 'debounce': 1,
-        }  # fmt: skip
+            'scenarios': ['f11_B'],
+            'detectors': ['scada', 'fixed', 'fixed_r1'],
+            'seeds': [3],
+            'calibration_days': 1,
+            'nominal_days': 0,
+            'debounce': 1,
+        }
         versions = {'damadics_fd': '0', 'python': '3', 'numpy': '2', 'numba': '0'}
         (directory / 'campaign.json').write_text(
             json.dumps({'campaign': stated, 'versions': versions})

@@ -50,8 +50,14 @@ class Cause:
     advice: str
     ne107: int  # as in damadics_msgs/FaultFlag
 
-    def describe(self, tag: str, value: float = math.nan, std: float = math.nan,
-                 confidence: float = math.nan, second: str = 'none') -> tuple[str, str]:
+    def describe(
+        self,
+        tag: str,
+        value: float = math.nan,
+        std: float = math.nan,
+        confidence: float = math.nan,
+        second: str = 'none',
+    ) -> tuple[str, str]:
         """
         Fill in the texts.
 
@@ -62,9 +68,13 @@ class Cause:
         :param second: the likeliest cause while it is not certain.
         :return: text, advice.
         """
-        words = {'tag': tag, 'value': _Number(value), 'margin': _Number(2.0 * std),
-                 'confidence': _Number(min(confidence, MOST_CERTAIN)),
-                 'second': second.replace('_', ' ')}
+        words = {
+            'tag': tag,
+            'value': _Number(value),
+            'margin': _Number(2.0 * std),
+            'confidence': _Number(min(confidence, MOST_CERTAIN)),
+            'second': second.replace('_', ' '),
+        }
         return self.text.format(**words), self.advice.format(**words)
 
 
@@ -109,8 +119,11 @@ def load_causes(path: Path | None = None) -> CauseTable:
     return CauseTable(causes, limits)
 
 
-def _parse(content: Any, source: str, standard: Mapping[str, Cause] | None = None,
-           ) -> tuple[dict[str, Cause], dict[str, tuple[float, ...]]]:
+def _parse(
+    content: Any,
+    source: str,
+    standard: Mapping[str, Cause] | None = None,
+) -> tuple[dict[str, Cause], dict[str, tuple[float, ...]]]:
     if not isinstance(content, dict) or not set(content) <= {'causes', 'limits'}:
         raise CauseTableError(source, ['expected the keys "causes" and "limits"'])
     problems: list[str] = []
@@ -149,8 +162,7 @@ def _is_limit(value: Any) -> bool:
     return number and math.isfinite(value) and value != 0
 
 
-def _cause(name: str, entry: dict[str, Any], default: Cause | None,
-           problems: list[str]) -> Cause:
+def _cause(name: str, entry: dict[str, Any], default: Cause | None, problems: list[str]) -> Cause:
     texts = {}
     for key in ('text', 'advice'):
         texts[key] = entry.get(key, getattr(default, key, ''))

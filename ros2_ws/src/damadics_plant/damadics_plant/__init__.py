@@ -18,6 +18,16 @@ from damadics_plant.scenario_file import ScenarioError, read_scenarios
 from damadics_plant.simulator import Simulator, simulate
 
 __all__ = [
-    'CATALOGUE', 'Actuator', 'Fault', 'LuGreActuator', 'Run', 'Scenario', 'ScenarioError',
-    'Simulator', 'load_scenario', 'read_scenarios', 'scenario_names', 'simulate',
+    'CATALOGUE',
+    'Actuator',
+    'Fault',
+    'LuGreActuator',
+    'Run',
+    'Scenario',
+    'ScenarioError',
+    'Simulator',
+    'load_scenario',
+    'read_scenarios',
+    'scenario_names',
+    'simulate',
 ]

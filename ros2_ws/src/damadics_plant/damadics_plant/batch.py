@@ -13,8 +13,11 @@ from damadics_plant.run import Run
 from damadics_plant.simulator import simulate
 
 
-def simulate_many(jobs: Iterable[dict[str, Any]], reduce: Callable[[Run], Any] | None = None,
-                  workers: int | None = None) -> Iterator[Any]:
+def simulate_many(
+    jobs: Iterable[dict[str, Any]],
+    reduce: Callable[[Run], Any] | None = None,
+    workers: int | None = None,
+) -> Iterator[Any]:
     """
     Run many scenarios, models or seeds in threads; the compiled loops run side by side.
 

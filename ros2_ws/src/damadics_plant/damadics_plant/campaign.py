@@ -79,9 +79,16 @@ def run_one(job: Job, stop: Stop, scada: Path | None = None, bar: bool = False) 
     with ExitStack() as stack:
         write = stack.enter_context(open_writer(job.out))
         write_scada = stack.enter_context(open_writer(scada)) if scada else None
-        progress = stack.enter_context(tqdm(
-            total=simulator.duration, unit=' s', bar_format=_BAR, unit_scale=True,
-            desc=job.scenario.name, disable=None if bar else True))
+        progress = stack.enter_context(
+            tqdm(
+                total=simulator.duration,
+                unit=' s',
+                bar_format=_BAR,
+                unit_scale=True,
+                desc=job.scenario.name,
+                disable=None if bar else True,
+            )
+        )
         while not simulator.finished and not stop.is_set():
             first = round(simulator.time * simulator.rate)
             columns = simulator.advance(_BLOCK)
@@ -114,8 +121,9 @@ def run_all(jobs: Sequence[Job], extension: str, stop: Stop, bar: bool = False) 
     total = sum(job.scenario.duration for job in jobs)
     with (
         ProcessPoolExecutor(workers, context, _prepare_worker, (asked,)) as pool,
-        tqdm(total=total, unit=' s', bar_format=_BAR, unit_scale=True,
-             disable=None if bar else True) as progress,
+        tqdm(
+            total=total, unit=' s', bar_format=_BAR, unit_scale=True, disable=None if bar else True
+        ) as progress,
     ):
         futures: dict[Future[bool], Job] = {}
         for job in sorted(jobs, key=lambda job: -job.scenario.duration):
@@ -148,8 +156,10 @@ def _check_space(path: Path, jobs: Sequence[Job]) -> None:
     existing = next(p for p in (path.absolute(), *path.absolute().parents) if p.exists())
     free = shutil.disk_usage(existing).free
     if wanted > free:
-        raise ValueError(f'--out: {samples} samples need about {wanted / 1e9:.0f} GB, '
-                         f'{existing} has {free / 1e9:.0f} GB; lower --rate')
+        raise ValueError(
+            f'--out: {samples} samples need about {wanted / 1e9:.0f} GB, '
+            f'{existing} has {free / 1e9:.0f} GB; lower --rate'
+        )
 
 
 _asked: Any = None

@@ -43,40 +43,71 @@ def parser() -> argparse.ArgumentParser:
     :return: the parser.
     """
     p = argparse.ArgumentParser(
-        prog='simulate', description='Simulate the DAMADICS actuator.', epilog=_EXAMPLE,
-        formatter_class=argparse.RawDescriptionHelpFormatter)
-    p.add_argument('scenario', nargs='*', metavar='SCENARIO',
-                   help=f'names of --list, FILE.yaml[:NAME], fN@STRENGTH, or {ALL};'
-                   ' nominal where there is only a --fault')
-    p.add_argument('--out', type=Path, metavar='PATH',
-                   help='FILE.csv or FILE.mcap; a folder where there are several scenarios')
-    p.add_argument('--format', choices=('csv', 'mcap'), default='csv',
-                   help='of the files in the folder')
-    p.add_argument('--scada', type=Path, metavar='FILE',
-                   help='write the same run at 1 Hz here, too')
+        prog='simulate',
+        description='Simulate the DAMADICS actuator.',
+        epilog=_EXAMPLE,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    p.add_argument(
+        'scenario',
+        nargs='*',
+        metavar='SCENARIO',
+        help=f'names of --list, FILE.yaml[:NAME], fN@STRENGTH, or {ALL};'
+        ' nominal where there is only a --fault',
+    )
+    p.add_argument(
+        '--out',
+        type=Path,
+        metavar='PATH',
+        help='FILE.csv or FILE.mcap; a folder where there are several scenarios',
+    )
+    p.add_argument(
+        '--format', choices=('csv', 'mcap'), default='csv', help='of the files in the folder'
+    )
+    p.add_argument(
+        '--scada', type=Path, metavar='FILE', help='write the same run at 1 Hz here, too'
+    )
     p.add_argument('--list', action='store_true', help='list the scenarios and exit')
     p.add_argument('--faults', action='store_true', help='list the faults and exit')
     p.add_argument('--model', choices=list(MODELS), default='dablib')
-    p.add_argument('--rate', type=float, metavar='HZ',
-                   help='samples per second (default: dablib 400, lugre 200)')
+    p.add_argument(
+        '--rate',
+        type=float,
+        metavar='HZ',
+        help='samples per second (default: dablib 400, lugre 200)',
+    )
     p.add_argument('--duration', type=float, metavar='S', help='length of the run')
     p.add_argument('--noise', action='store_true', help="add the benchmark's disturbances")
     p.add_argument('--seed', type=int, default=0, metavar='N', help='of noise and random inputs')
     p.add_argument('--quiet', action='store_true', help='no progress bar')
     inputs = p.add_argument_group(
-        'recorded inputs', 'FILE.csv:COLUMN[*FACTOR] or BAG:FIELD[*FACTOR], factor to SI')
+        'recorded inputs', 'FILE.csv:COLUMN[*FACTOR] or BAG:FIELD[*FACTOR], factor to SI'
+    )
     for name in ('cv', 'p1', 'p2', 't1'):
         inputs.add_argument(f'--{name}', metavar='SOURCE')
     fault = p.add_argument_group('a fault of your own, instead of those of the scenario')
     fault.add_argument('--fault', metavar='fN', help='f1 .. f19')
-    fault.add_argument('--strength', type=float, default=1.0, metavar='S',
-                       help='signed, default 1')
-    fault.add_argument('--from', type=float, default=0.0, metavar='T', dest='start',
-                       help='begin [s], default 0')
-    fault.add_argument('--to', type=float, default=float('inf'), metavar='T', dest='end',
-                       help='end [s], default never')
-    fault.add_argument('--development', type=float, default=0.0, metavar='T',
-                       help='time to full strength [s], default 0: abrupt')
+    fault.add_argument(
+        '--strength', type=float, default=1.0, metavar='S', help='signed, default 1'
+    )
+    fault.add_argument(
+        '--from', type=float, default=0.0, metavar='T', dest='start', help='begin [s], default 0'
+    )
+    fault.add_argument(
+        '--to',
+        type=float,
+        default=float('inf'),
+        metavar='T',
+        dest='end',
+        help='end [s], default never',
+    )
+    fault.add_argument(
+        '--development',
+        type=float,
+        default=0.0,
+        metavar='T',
+        help='time to full strength [s], default 0: abrupt',
+    )
     return p
 
 
@@ -100,8 +131,13 @@ def scenario_from(name: str, arguments: argparse.Namespace) -> Scenario:
             changes: dict[str, Any] = {signal_name: recorded}
             scenario = replace(scenario, **changes)
     if arguments.fault:
-        fault = Fault(arguments.fault, arguments.strength, arguments.start,
-                      arguments.development, arguments.end)
+        fault = Fault(
+            arguments.fault,
+            arguments.strength,
+            arguments.start,
+            arguments.development,
+            arguments.end,
+        )
         scenario = replace(scenario, faults=(fault,))
     if arguments.duration is not None:
         scenario = replace(scenario, duration=arguments.duration)
@@ -152,12 +188,18 @@ def main(args: Sequence[str] | None = None) -> int:
     names = list(arguments.scenario)
     if ALL in names:
         standard = [name for name in scenario_names() if re.match(r'f\d', name)]
-        names[names.index(ALL):names.index(ALL) + 1] = standard
+        names[names.index(ALL) : names.index(ALL) + 1] = standard
     warnings.showwarning = lambda message, *_: print(f'simulate: {message}', file=sys.stderr)
     try:
         jobs = [
-            Job(scenario_from(name, arguments), arguments.out, arguments.rate, arguments.model,
-                arguments.noise, arguments.seed)
+            Job(
+                scenario_from(name, arguments),
+                arguments.out,
+                arguments.rate,
+                arguments.model,
+                arguments.noise,
+                arguments.seed,
+            )
             for name in names
         ]
         with _stop_on_signal() as stop:

@@ -30,16 +30,30 @@ from damadics_plant.valve import vapour_pressure
 RATE = 400.0
 """Steps per second."""
 
-STATE_DTYPE = np.dtype((np.record, [
-    ('y1', 'f8'), ('y2', 'f8'),  # set-point filter [1]
-    ('ma', 'f8'), ('p', 'f8'),  # air in the chamber [kg], its absolute pressure [Pa]
-    ('v', 'f8'), ('x', 'f8'),  # stem before the play [m/s, m]
-    ('x_', 'f8'), ('xp_', 'f8'), ('up', 'i8'),  # history of the play: in, out, direction
-    ('X_', 'f8'), ('ps_', 'f8'), ('at_stop', 'i8'),  # memory: position [m], pressure [Pa], stops
-    ('xb', 'f8'), ('e', 'f8'),  # position feedback [m], held E/P output
-    ('t1', 'f8'), ('pv', 'f8'),  # medium [degC], its vapour pressure [Pa]
-    ('k', 'i8'),  # steps done
-]))
+STATE_DTYPE = np.dtype(
+    (
+        np.record,
+        [
+            ('y1', 'f8'),
+            ('y2', 'f8'),  # set-point filter [1]
+            ('ma', 'f8'),
+            ('p', 'f8'),  # air in the chamber [kg], its absolute pressure [Pa]
+            ('v', 'f8'),
+            ('x', 'f8'),  # stem before the play [m/s, m]
+            ('x_', 'f8'),
+            ('xp_', 'f8'),
+            ('up', 'i8'),  # history of the play: in, out, direction
+            ('X_', 'f8'),
+            ('ps_', 'f8'),
+            ('at_stop', 'i8'),  # memory: position [m], pressure [Pa], stops
+            ('xb', 'f8'),
+            ('e', 'f8'),  # position feedback [m], held E/P output
+            ('t1', 'f8'),
+            ('pv', 'f8'),  # medium [degC], its vapour pressure [Pa]
+            ('k', 'i8'),  # steps done
+        ],
+    )
+)
 
 
 def initial_state(a: Actuator) -> 'np.ndarray[Any, np.dtype[Any]]':
@@ -70,8 +84,18 @@ def _play(x: float, s: Record, width: float) -> tuple[float, int]:
 
 
 @jit
-def _derivatives(ma: float, p: float, v: float, x: float, inflow: float, held: float,
-                 width: float, s: Record, a: Record, e: Record) -> tuple[float, float, float]:
+def _derivatives(
+    ma: float,
+    p: float,
+    v: float,
+    x: float,
+    inflow: float,
+    held: float,
+    width: float,
+    s: Record,
+    a: Record,
+    e: Record,
+) -> tuple[float, float, float]:
     xp, _ = _play(x, s, width)
     X = min(max(xp, 0.0), e.stop)
     V = a.dead_volume + e.area * X
@@ -87,8 +111,17 @@ def _derivatives(ma: float, p: float, v: float, x: float, inflow: float, held: f
 
 
 @jit
-def simulate_block(state: Any, constants: Any, faults: Any, f: Any, effects: Any,
-                   inputs: np.ndarray, rate: float, every: int, out: np.ndarray) -> None:
+def simulate_block(
+    state: Any,
+    constants: Any,
+    faults: Any,
+    f: Any,
+    effects: Any,
+    inputs: np.ndarray,
+    rate: float,
+    every: int,
+    out: np.ndarray,
+) -> None:
     """
     Advance the plant over a block of steps and sample its outputs.
 
@@ -137,21 +170,42 @@ def simulate_block(state: Any, constants: Any, faults: Any, f: Any, effects: Any
         opening = min(max(s.e * e.opening, -1.0), 1.0)
         inflow = air_flow(opening, e.supply, s.ps_, a.air_flow)
 
-        held = (a.mass * a.gravity - plug_force(xr, max(p1, s.pv) - p2, a.plug_diameter)
-                - a.stiffness * (s.X_ + a.preload) * e.spring)
+        held = (
+            a.mass * a.gravity
+            - plug_force(xr, max(p1, s.pv) - p2, a.plug_diameter)
+            - a.stiffness * (s.X_ + a.preload) * e.spring
+        )
         m1, p1_, v1 = _derivatives(s.ma, s.p, s.v, s.x, inflow, held, width, s, a, e)
         x1 = s.v
         m2, p2_, v2 = _derivatives(
-            s.ma + 0.5 * h * m1, s.p + 0.5 * h * p1_, s.v + 0.5 * h * v1, s.x + 0.5 * h * x1,
-            inflow, held, width, s, a, e)
+            s.ma + 0.5 * h * m1,
+            s.p + 0.5 * h * p1_,
+            s.v + 0.5 * h * v1,
+            s.x + 0.5 * h * x1,
+            inflow,
+            held,
+            width,
+            s,
+            a,
+            e,
+        )
         x2 = s.v + 0.5 * h * v1
         m3, p3_, v3 = _derivatives(
-            s.ma + 0.5 * h * m2, s.p + 0.5 * h * p2_, s.v + 0.5 * h * v2, s.x + 0.5 * h * x2,
-            inflow, held, width, s, a, e)
+            s.ma + 0.5 * h * m2,
+            s.p + 0.5 * h * p2_,
+            s.v + 0.5 * h * v2,
+            s.x + 0.5 * h * x2,
+            inflow,
+            held,
+            width,
+            s,
+            a,
+            e,
+        )
         x3 = s.v + 0.5 * h * v2
         m4, p4_, v4 = _derivatives(
-            s.ma + h * m3, s.p + h * p3_, s.v + h * v3, s.x + h * x3,
-            inflow, held, width, s, a, e)
+            s.ma + h * m3, s.p + h * p3_, s.v + h * v3, s.x + h * x3, inflow, held, width, s, a, e
+        )
         x4 = s.v + h * v3
 
         s.x_, s.xp_, s.up, s.X_, s.ps_ = s.x, xp, up, X, ps

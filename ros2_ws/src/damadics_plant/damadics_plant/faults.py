@@ -45,53 +45,154 @@ _POSITIONER, _EXTERNAL = 'positioner', 'external'
 CATALOGUE: dict[str, FaultKind] = {
     kind.key: kind
     for kind in (
-        FaultKind(1, 'valve clogging', _VALVE, 0,
-                  'deposits keep the plug from closing', 'upper stop H = H0 (1 - f)'),
-        FaultKind(2, 'plug or seat sedimentation', _VALVE, 0,
-                  'deposits on plug and seat: less flow, less travel',
-                  'H = H0 (1 - 0.2 f), X_r += 0.2 f, K_vr *= 1 - 0.2 f'),
-        FaultKind(3, 'plug or seat erosion', _VALVE, 0,
-                  'worn plug and seat: more flow, more travel',
-                  'H = H0 (1 + 0.1 f), X_r -= 0.1 f, K_vr *= 1 + 0.1 f'),
-        FaultKind(4, 'increased valve or bushing friction', _VALVE, -1,
-                  'tight packing; f < 0: less than nominal friction',
-                  'play D_b = sat_0^X0 [X0 (0.01 + f)]; LuGre: F *= 1 + 20 f (f < 0: 1 + f)'),
-        FaultKind(5, 'external leakage', _VALVE, 0,
-                  'leaky bushing, cover or terminals', 'F_v *= 1 - 0.05 f'),
-        FaultKind(6, 'internal leakage', _VALVE, 0,
-                  'the closed valve is not tight', 'K_vr += 0.1 f'),
-        FaultKind(7, 'medium evaporation or critical flow', _VALVE, 0,
-                  'the liquid is too hot for its pressure',
-                  'T = min(300, T + 200 + 100 f) where f > 0'),
-        FaultKind(8, 'twisted piston rod', _SERVO, 0,
-                  'bent rod: more hysteresis as the valve opens',
-                  'D_b *= 1 + 0.5 f (1 - X_r); not on the LuGre plant'),
-        FaultKind(9, 'servomotor housing or terminals tightness', _SERVO, 0,
-                  'air leaks from the chamber', 'leak 0.1 f 2e-6 sqrt(P_s) kg/s'),
-        FaultKind(10, 'diaphragm perforation', _SERVO, 0,
-                  'air leaks through the diaphragm, which loses area',
-                  'leak as f9, A_e *= 1 - f'),
-        FaultKind(11, 'spring fault', _SERVO, 0,
-                  'the spring gives way',
-                  'F_s *= 1 - f; LuGre: K *= 1 + f, f in -1..1', lugre_minimum=-1),
-        FaultKind(12, 'electro-pneumatic transducer fault', _POSITIONER, -1,
-                  'gain error of the E/P transducer', 'output of the transducer *= 1 - f'),
-        FaultKind(13, 'rod displacement sensor fault', _POSITIONER, -1,
-                  'gain error of the position sensor',
-                  "X' and feedback = X (1 + 1.25 f)"),
-        FaultKind(14, 'pressure sensor fault', _POSITIONER, -1,
-                  'gain error of the chamber pressure sensor', "P_s' *= 1 - f"),
-        FaultKind(15, 'positioner feedback fault', _POSITIONER, 0,
-                  'loose lever of the position feedback', 'play f X0 in the feedback'),
-        FaultKind(16, 'positioner supply pressure drop', _EXTERNAL, 0,
-                  'too little supply air', 'P_z *= 1 - f, 0 below 120 kPa'),
-        FaultKind(17, 'unexpected pressure change across the valve', _EXTERNAL, -1,
-                  'pump or downstream fault',
-                  'f > 0: P2 *= 1 - f; f < 0: P1 *= 1 + f'),
-        FaultKind(18, 'fully or partly opened bypass valve', _EXTERNAL, 0,
-                  'medium passes beside the valve', 'bypass position X_b = 1 - f'),
-        FaultKind(19, 'flow rate sensor fault', _EXTERNAL, -1,
-                  'gain error of the flow meter', "F' *= 1 - f"),
+        FaultKind(
+            1,
+            'valve clogging',
+            _VALVE,
+            0,
+            'deposits keep the plug from closing',
+            'upper stop H = H0 (1 - f)',
+        ),
+        FaultKind(
+            2,
+            'plug or seat sedimentation',
+            _VALVE,
+            0,
+            'deposits on plug and seat: less flow, less travel',
+            'H = H0 (1 - 0.2 f), X_r += 0.2 f, K_vr *= 1 - 0.2 f',
+        ),
+        FaultKind(
+            3,
+            'plug or seat erosion',
+            _VALVE,
+            0,
+            'worn plug and seat: more flow, more travel',
+            'H = H0 (1 + 0.1 f), X_r -= 0.1 f, K_vr *= 1 + 0.1 f',
+        ),
+        FaultKind(
+            4,
+            'increased valve or bushing friction',
+            _VALVE,
+            -1,
+            'tight packing; f < 0: less than nominal friction',
+            'play D_b = sat_0^X0 [X0 (0.01 + f)]; LuGre: F *= 1 + 20 f (f < 0: 1 + f)',
+        ),
+        FaultKind(
+            5,
+            'external leakage',
+            _VALVE,
+            0,
+            'leaky bushing, cover or terminals',
+            'F_v *= 1 - 0.05 f',
+        ),
+        FaultKind(
+            6, 'internal leakage', _VALVE, 0, 'the closed valve is not tight', 'K_vr += 0.1 f'
+        ),
+        FaultKind(
+            7,
+            'medium evaporation or critical flow',
+            _VALVE,
+            0,
+            'the liquid is too hot for its pressure',
+            'T = min(300, T + 200 + 100 f) where f > 0',
+        ),
+        FaultKind(
+            8,
+            'twisted piston rod',
+            _SERVO,
+            0,
+            'bent rod: more hysteresis as the valve opens',
+            'D_b *= 1 + 0.5 f (1 - X_r); not on the LuGre plant',
+        ),
+        FaultKind(
+            9,
+            'servomotor housing or terminals tightness',
+            _SERVO,
+            0,
+            'air leaks from the chamber',
+            'leak 0.1 f 2e-6 sqrt(P_s) kg/s',
+        ),
+        FaultKind(
+            10,
+            'diaphragm perforation',
+            _SERVO,
+            0,
+            'air leaks through the diaphragm, which loses area',
+            'leak as f9, A_e *= 1 - f',
+        ),
+        FaultKind(
+            11,
+            'spring fault',
+            _SERVO,
+            0,
+            'the spring gives way',
+            'F_s *= 1 - f; LuGre: K *= 1 + f, f in -1..1',
+            lugre_minimum=-1,
+        ),
+        FaultKind(
+            12,
+            'electro-pneumatic transducer fault',
+            _POSITIONER,
+            -1,
+            'gain error of the E/P transducer',
+            'output of the transducer *= 1 - f',
+        ),
+        FaultKind(
+            13,
+            'rod displacement sensor fault',
+            _POSITIONER,
+            -1,
+            'gain error of the position sensor',
+            "X' and feedback = X (1 + 1.25 f)",
+        ),
+        FaultKind(
+            14,
+            'pressure sensor fault',
+            _POSITIONER,
+            -1,
+            'gain error of the chamber pressure sensor',
+            "P_s' *= 1 - f",
+        ),
+        FaultKind(
+            15,
+            'positioner feedback fault',
+            _POSITIONER,
+            0,
+            'loose lever of the position feedback',
+            'play f X0 in the feedback',
+        ),
+        FaultKind(
+            16,
+            'positioner supply pressure drop',
+            _EXTERNAL,
+            0,
+            'too little supply air',
+            'P_z *= 1 - f, 0 below 120 kPa',
+        ),
+        FaultKind(
+            17,
+            'unexpected pressure change across the valve',
+            _EXTERNAL,
+            -1,
+            'pump or downstream fault',
+            'f > 0: P2 *= 1 - f; f < 0: P1 *= 1 + f',
+        ),
+        FaultKind(
+            18,
+            'fully or partly opened bypass valve',
+            _EXTERNAL,
+            0,
+            'medium passes beside the valve',
+            'bypass position X_b = 1 - f',
+        ),
+        FaultKind(
+            19,
+            'flow rate sensor fault',
+            _EXTERNAL,
+            -1,
+            'gain error of the flow meter',
+            "F' *= 1 - f",
+        ),
     )
 }
 
@@ -159,10 +260,19 @@ class Fault:
         return float(strength_at(fault_table([self])[0], t))
 
 
-FAULT_DTYPE = np.dtype((np.record, [
-    ('number', 'i8'), ('strength', 'f8'), ('start', 'f8'), ('end', 'f8'), ('development', 'f8'),
-    ('now', 'f8'),  # signed strength that the effects are made from
-]))
+FAULT_DTYPE = np.dtype(
+    (
+        np.record,
+        [
+            ('number', 'i8'),
+            ('strength', 'f8'),
+            ('start', 'f8'),
+            ('end', 'f8'),
+            ('development', 'f8'),
+            ('now', 'f8'),  # signed strength that the effects are made from
+        ],
+    )
+)
 
 
 def fault_table(faults: Sequence[Fault]) -> 'np.ndarray[Any, np.dtype[Any]]':
@@ -174,8 +284,14 @@ def fault_table(faults: Sequence[Fault]) -> 'np.ndarray[Any, np.dtype[Any]]':
     """
     rows = np.zeros(len(faults), FAULT_DTYPE)
     for i, fault in enumerate(faults):
-        rows[i] = (fault.number, fault.strength * fault.direction,
-                   fault.start, fault.end, fault.development, math.nan)
+        rows[i] = (
+            fault.number,
+            fault.strength * fault.direction,
+            fault.start,
+            fault.end,
+            fault.development,
+            math.nan,
+        )
     return rows
 
 
@@ -195,13 +311,39 @@ def strength_at(fault: Record, t: float) -> float:
     return fault.strength * (t - fault.start) / fault.development
 
 
-EFFECTS_DTYPE = np.dtype((np.record, [
-    (name, 'f8') for name in (
-        'stop', 'xr_offset', 'kv_factor', 'kv_offset', 'flow_factor', 'play', 'twist', 'leak',
-        'area', 'spring', 'friction', 'opening', 'position', 'ps_sensor', 'feedback', 'supply',
-        'p1', 'p2', 'bypass', 'flow_sensor', 'heat', 'number', 'strength',
+EFFECTS_DTYPE = np.dtype(
+    (
+        np.record,
+        [
+            (name, 'f8')
+            for name in (
+                'stop',
+                'xr_offset',
+                'kv_factor',
+                'kv_offset',
+                'flow_factor',
+                'play',
+                'twist',
+                'leak',
+                'area',
+                'spring',
+                'friction',
+                'opening',
+                'position',
+                'ps_sensor',
+                'feedback',
+                'supply',
+                'p1',
+                'p2',
+                'bypass',
+                'flow_sensor',
+                'heat',
+                'number',
+                'strength',
+            )
+        ],
     )
-]))
+)
 """What the faults change, in the units of the model; filled by `update_effects`."""
 
 

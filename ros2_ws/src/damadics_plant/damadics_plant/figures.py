@@ -24,13 +24,26 @@ if TYPE_CHECKING:
 NOMINAL, FAULTY, LUGRE, SET_POINT = '#9aa0a6', '#d1495b', '#2e6f95', '#2b2d42'
 FLOW, CHAMBER = '#e09f3e', '#7b5ea7'
 _STYLE: dict[Any, Any] = {
-    'font.size': 9, 'axes.titlesize': 9, 'axes.spines.top': False, 'axes.spines.right': False,
-    'axes.grid': True, 'grid.color': '#eceff1', 'lines.linewidth': 1.3, 'svg.hashsalt': 'plant',
+    'font.size': 9,
+    'axes.titlesize': 9,
+    'axes.spines.top': False,
+    'axes.spines.right': False,
+    'axes.grid': True,
+    'grid.color': '#eceff1',
+    'lines.linewidth': 1.3,
+    'svg.hashsalt': 'plant',
 }
 _SHORT = {
-    'f4': 'increased friction', 'f7': 'medium evaporation', 'f9': 'housing tightness',
-    'f12': 'E/P transducer fault', 'f13': 'position sensor fault', 'f16': 'supply pressure drop',
-    'f17': 'pressure change', 'f18': 'opened bypass valve', 'f2': 'sedimentation', 'f3': 'erosion',
+    'f4': 'increased friction',
+    'f7': 'medium evaporation',
+    'f9': 'housing tightness',
+    'f12': 'E/P transducer fault',
+    'f13': 'position sensor fault',
+    'f16': 'supply pressure drop',
+    'f17': 'pressure change',
+    'f18': 'opened bypass valve',
+    'f2': 'sedimentation',
+    'f3': 'erosion',
     'f15': 'position feedback fault',
 }
 _NEGATIVE = {'f12', 'f14', 'f19'}  # the direction of the standard scenarios
@@ -46,8 +59,13 @@ def draw_step_response() -> 'Figure':
 
     scenario = Scenario('step', 60, cv=Steps((0, 20), (1.0, 0.0)))
     figure, (above, middle, below) = pyplot.subplots(
-        3, 1, figsize=(7.2, 5.2), sharex=True, layout='constrained',
-        gridspec_kw={'height_ratios': (3, 2, 2)})
+        3,
+        1,
+        figsize=(7.2, 5.2),
+        sharex=True,
+        layout='constrained',
+        gridspec_kw={'height_ratios': (3, 2, 2)},
+    )
     for model, colour, style in (('dablib', FAULTY, '-'), ('lugre', LUGRE, (0, (5, 3)))):
         run = simulate(scenario, rate=100, model=model)
         name = {'dablib': 'DABLib', 'lugre': 'LuGre'}[model]
@@ -55,10 +73,20 @@ def draw_step_response() -> 'Figure':
         middle.plot(run.t, run.ps / 1e3, color=colour, ls=style)
         below.plot(run.t, run.flow, color=colour, ls=style)
     above.plot(run.t, run.cv, color=SET_POINT, lw=1, ls=':', label='control value CV')
-    above.annotate('dead time 2.9 s', (2.9, 0.03), (4.5, 0.2), color=FAULTY,
-                   arrowprops={'arrowstyle': '->', 'color': FAULTY})
-    above.annotate('venting is slower\nthan filling', (37, 0.5), (42, 0.62), color=FAULTY,
-                   arrowprops={'arrowstyle': '->', 'color': FAULTY})
+    above.annotate(
+        'dead time 2.9 s',
+        (2.9, 0.03),
+        (4.5, 0.2),
+        color=FAULTY,
+        arrowprops={'arrowstyle': '->', 'color': FAULTY},
+    )
+    above.annotate(
+        'venting is slower\nthan filling',
+        (37, 0.5),
+        (42, 0.62),
+        color=FAULTY,
+        arrowprops={'arrowstyle': '->', 'color': FAULTY},
+    )
     above.legend(loc='center right', frameon=False, bbox_to_anchor=(1, 0.35))
     above.set_ylabel('0 open, 1 closed')
     middle.set_ylabel('chamber [kPa]')
@@ -97,21 +125,35 @@ def draw_fault_effects() -> 'Figure':
     from matplotlib.lines import Line2D
 
     nominal = simulate('nominal', rate=10, duration=1000.0)
-    figure, grid = pyplot.subplots(4, 5, figsize=(11, 6.6), sharex=True, sharey=True,
-                                   layout='constrained')
+    figure, grid = pyplot.subplots(
+        4, 5, figsize=(11, 6.6), sharex=True, sharey=True, layout='constrained'
+    )
     panels = list(grid.flat)
     for axes, fault in zip(panels, CATALOGUE, strict=False):
         _panel(axes, fault, nominal)
     key = panels[-1]
     key.axis('off')
-    lines = [("position X'", FAULTY), ("flow F'", FLOW), ('chamber pressure (f14)', CHAMBER),
-             ('without the fault', NOMINAL)]
-    key.legend([Line2D([], [], color=colour) for _, colour in lines], [text for text, _ in lines],
-               loc='center', frameon=False)
+    lines = [
+        ("position X'", FAULTY),
+        ("flow F'", FLOW),
+        ('chamber pressure (f14)', CHAMBER),
+        ('without the fault', NOMINAL),
+    ]
+    key.legend(
+        [Line2D([], [], color=colour) for _, colour in lines],
+        [text for text, _ in lines],
+        loc='center',
+        frameon=False,
+    )
     for axes in grid[-1][:-1]:
         axes.set_xlabel('s after the fault')
-    figure.suptitle('Each fault at strength 0.75 (f12, f14, f19: -0.75), shares of the range',
-                    x=0.01, ha='left', weight='bold', fontsize=10)
+    figure.suptitle(
+        'Each fault at strength 0.75 (f12, f14, f19: -0.75), shares of the range',
+        x=0.01,
+        ha='left',
+        weight='bold',
+        fontsize=10,
+    )
     return figure
 
 
@@ -122,7 +164,8 @@ def _save(figure: 'Figure', path: Path) -> None:
     buffer = io.BytesIO()
     figure.savefig(buffer, dpi=100)
     Image.open(buffer).convert('RGB').quantize(64, dither=Image.Dither.NONE).save(
-        path, optimize=True)
+        path, optimize=True
+    )
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -132,8 +175,11 @@ def main(args: Sequence[str] | None = None) -> int:
     :param args: arguments, those of the process where absent.
     :return: exit code.
     """
-    p = argparse.ArgumentParser(prog='figures', description=__doc__,
-                                epilog='example: ros2 run damadics_plant figures --out doc')
+    p = argparse.ArgumentParser(
+        prog='figures',
+        description=__doc__,
+        epilog='example: ros2 run damadics_plant figures --out doc',
+    )
     p.add_argument('--out', type=Path, default=Path(), metavar='FOLDER')
     out = p.parse_args(args).out
     try:

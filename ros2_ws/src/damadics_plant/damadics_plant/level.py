@@ -56,8 +56,16 @@ class LevelLoop:
 
         :return: a loop with the same settings.
         """
-        return LevelLoop(self.set_point, self.gain, self.reset_time, self.bias, self.area,
-                         self.span, self.draw, self.period)
+        return LevelLoop(
+            self.set_point,
+            self.gain,
+            self.reset_time,
+            self.bias,
+            self.area,
+            self.span,
+            self.draw,
+            self.period,
+        )
 
     def control(self) -> None:
         """Evaluate the controller on the present level for the next period."""

@@ -40,8 +40,12 @@ def load_scenario(name: str) -> Scenario:
     free = re.fullmatch(r'(f\d+)@(-?[\d.]+)', name)
     if free:
         fault = Fault(free[1], float(free[2]), start=900.0)
-        return replace(_built_in()['nominal'], name=name, faults=(fault,),
-                       description=f'{CATALOGUE[free[1]].name}, abrupt {free[2]}')
+        return replace(
+            _built_in()['nominal'],
+            name=name,
+            faults=(fault,),
+            description=f'{CATALOGUE[free[1]].name}, abrupt {free[2]}',
+        )
     path, extension, entry = name.partition('.yaml')
     if not extension:
         raise ScenarioError(f'scenario: there is no {name!r}; see --list, or give FILE.yaml:NAME')
@@ -51,7 +55,8 @@ def load_scenario(name: str) -> Scenario:
         return next(iter(scenarios.values()))
     if entry not in scenarios:
         raise ScenarioError(
-            f'{path}.yaml: scenario {entry!r} is not one of {", ".join(scenarios)}')
+            f'{path}.yaml: scenario {entry!r} is not one of {", ".join(scenarios)}'
+        )
     return scenarios[entry]
 
 

@@ -36,14 +36,26 @@ SUBSTEP = 1e-3
 JERK = 0.01
 """Change of velocity in a substep beyond which the substep is done again in four [m/s]."""
 
-STATE_DTYPE = np.dtype((np.record, [
-    ('y1', 'f8'), ('y2', 'f8'),  # set-point filter [1]
-    ('ma', 'f8'),  # air in the chamber [kg]
-    ('v', 'f8'), ('x', 'f8'), ('z', 'f8'),  # stem [m/s, m], bristles [m]
-    ('xb', 'f8'), ('e', 'f8'),  # position feedback [m], held E/P output
-    ('t1', 'f8'), ('pv', 'f8'),  # medium [degC], its vapour pressure [Pa]
-    ('k', 'i8'), ('substep', 'i8'), ('held', 'i8'),  # ticks, substeps and holds done
-]))
+STATE_DTYPE = np.dtype(
+    (
+        np.record,
+        [
+            ('y1', 'f8'),
+            ('y2', 'f8'),  # set-point filter [1]
+            ('ma', 'f8'),  # air in the chamber [kg]
+            ('v', 'f8'),
+            ('x', 'f8'),
+            ('z', 'f8'),  # stem [m/s, m], bristles [m]
+            ('xb', 'f8'),
+            ('e', 'f8'),  # position feedback [m], held E/P output
+            ('t1', 'f8'),
+            ('pv', 'f8'),  # medium [degC], its vapour pressure [Pa]
+            ('k', 'i8'),
+            ('substep', 'i8'),
+            ('held', 'i8'),  # ticks, substeps and holds done
+        ],
+    )
+)
 
 
 def initial_state(a: LuGreActuator) -> 'np.ndarray[Any, np.dtype[Any]]':
@@ -60,8 +72,16 @@ def initial_state(a: LuGreActuator) -> 'np.ndarray[Any, np.dtype[Any]]':
 
 
 @jit
-def _half_step(v: float, z: float, h: float, mass: float, force: float, stiffness: float,
-               scale: float, a: Record) -> tuple[float, float]:
+def _half_step(
+    v: float,
+    z: float,
+    h: float,
+    mass: float,
+    force: float,
+    stiffness: float,
+    scale: float,
+    a: Record,
+) -> tuple[float, float]:
     """
     Solve one implicit Euler step of stem and bristles for the new velocity.
 
@@ -118,10 +138,15 @@ def _substep(s: Record, a: Record, e: Record, dp: float, h: float) -> None:
     p_mid = (s.ma + 0.5 * h * flow) * rt / volume
     xr = s.x / a.stroke + e.xr_offset
     k = a.stiffness * e.spring
-    force = (a.mass * a.gravity + e.area * (p_mid - ATMOSPHERE)
-             - plug_force(xr, dp, a.plug_diameter) - k * (s.x + a.preload))
-    stiffness = (k + e.area * e.area * p_mid / volume
-                 + plug_stiffness(xr, dp, a.plug_diameter, a.stroke))
+    force = (
+        a.mass * a.gravity
+        + e.area * (p_mid - ATMOSPHERE)
+        - plug_force(xr, dp, a.plug_diameter)
+        - k * (s.x + a.preload)
+    )
+    stiffness = (
+        k + e.area * e.area * p_mid / volume + plug_stiffness(xr, dp, a.plug_diameter, a.stroke)
+    )
     v, z = _half_step(s.v, s.z, 0.5 * h, a.mass, force, stiffness, e.friction, a)
     x = s.x + h * v  # twice the half step: y+ = 2 y_half - y
     v, z = 2.0 * v - s.v, 2.0 * z - s.z
@@ -135,8 +160,17 @@ def _substep(s: Record, a: Record, e: Record, dp: float, h: float) -> None:
 
 
 @jit
-def simulate_block(state: Any, constants: Any, faults: Any, f: Any, effects: Any,
-                   inputs: np.ndarray, rate: float, every: int, out: np.ndarray) -> None:
+def simulate_block(
+    state: Any,
+    constants: Any,
+    faults: Any,
+    f: Any,
+    effects: Any,
+    inputs: np.ndarray,
+    rate: float,
+    every: int,
+    out: np.ndarray,
+) -> None:
     """
     Advance the plant over a block of ticks and sample its outputs.
 
@@ -163,8 +197,10 @@ def simulate_block(state: Any, constants: Any, faults: Any, f: Any, effects: Any
             s.t1, s.pv = t1, vapour_pressure(t1)
         s.x = min(s.x, e.stop)
         if i % every == 0:
-            ps = (s.ma * a.gas_constant * a.air_temperature / (a.dead_volume + e.area * s.x)
-                  - ATMOSPHERE)
+            ps = (
+                s.ma * a.gas_constant * a.air_temperature / (a.dead_volume + e.area * s.x)
+                - ATMOSPHERE
+            )
             x = s.x / a.stroke
             measure(x + e.xr_offset, x, ps, p1, p2, t1, s.pv, a, e, out[:, i // every])
         dp = max(p1, s.pv) - p2

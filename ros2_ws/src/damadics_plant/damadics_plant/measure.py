@@ -15,8 +15,18 @@ ROWS = len(OUTPUTS) + 1
 
 
 @jit
-def measure(xr: float, x: float, ps: float, p1: float, p2: float, t1: float,
-            pv: float, a: Record, e: Record, out: np.ndarray) -> None:
+def measure(
+    xr: float,
+    x: float,
+    ps: float,
+    p1: float,
+    p2: float,
+    t1: float,
+    pv: float,
+    a: Record,
+    e: Record,
+    out: np.ndarray,
+) -> None:
     """
     Fill one sample of the outputs, each within the range of its transmitter.
 

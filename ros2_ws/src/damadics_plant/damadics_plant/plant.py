@@ -58,24 +58,30 @@ class Plant(Node):
         noise = declare('noise', False, 'add the noise of the benchmark')
         seed = declare('seed', 0, 'seed of the noise and of random inputs', limits=(0, 2**31 - 1))
         self._factor = declare(
-            'real_time_factor', 1.0,
+            'real_time_factor',
+            1.0,
             'seconds of scenario per second of wall time [1]; 0: as fast as it goes',
             limits=(0.0, 1000.0),
         )
         self._awaited = declare(
-            'wait_for_subscribers', 0,
-            'number of subscribers on measurement before the first sample', limits=(0, 100),
+            'wait_for_subscribers',
+            0,
+            'number of subscribers on measurement before the first sample',
+            limits=(0, 100),
         )
         self._frame_id = declare('actuator', 'LC74_20', 'tag of the actuator')
         duration = declare(
-            'duration', 0.0, 'time that is simulated [s]; 0: that of the scenario',
+            'duration',
+            0.0,
+            'time that is simulated [s]; 0: that of the scenario',
             limits=(0.0, 1e9),
         )
         publish_clock = declare('publish_clock', False, 'publish /clock from scenario time')
         parameters.check()
         try:
-            self._simulator = Simulator(scenario, rate=rate, model=model, noise=noise, seed=seed,
-                                        duration=duration or None)
+            self._simulator = Simulator(
+                scenario, rate=rate, model=model, noise=noise, seed=seed, duration=duration or None
+            )
         except ValueError as problem:
             parameters.check(f'scenario: {problem}')
         self._measurement = self.create_publisher(Measurement, 'measurement', qos.SAMPLES)
@@ -93,7 +99,8 @@ class Plant(Node):
         self._ahead: deque[tuple[int, bytes, bytes]] = deque()
         self._simulate(self._block)  # before the clock runs: the first block loads compiled code
         self.create_timer(
-            self._tick_length, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
+            self._tick_length, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME)
+        )
         self.get_logger().info(
             f'{scenario}, model {model}, {rate:g} Hz, real-time factor {self._factor:g}'
         )
@@ -118,7 +125,8 @@ class Plant(Node):
                 self._began += behind
                 self.get_logger().warning(
                     f'this machine does not reach real-time factor {self._factor:g}: '
-                    f'{behind:.1f} s behind', throttle_duration_sec=5.0,
+                    f'{behind:.1f} s behind',
+                    throttle_duration_sec=5.0,
                 )
         if due > 0:
             self._publish(min(due, LARGEST_BURST))

@@ -48,8 +48,13 @@ def _csv(path: Path, column: str) -> tuple[np.ndarray, np.ndarray]:
         raise ValueError(f'{path}: has no time column ({", ".join(_TIME)})')
     if column not in header:
         raise ValueError(f'{path}: has no column {column!r}; it has {", ".join(header)}')
-    table = np.genfromtxt(path, delimiter=',', skip_header=1, ndmin=2,
-                          usecols=(header.index(time), header.index(column)))
+    table = np.genfromtxt(
+        path,
+        delimiter=',',
+        skip_header=1,
+        ndmin=2,
+        usecols=(header.index(time), header.index(column)),
+    )
     return table[:, 0] * _TIME[time], table[:, 1]
 
 

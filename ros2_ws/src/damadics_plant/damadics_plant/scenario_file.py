@@ -73,8 +73,9 @@ class _Reader:
             self.wrong(f'{key}.{k}' if key else k, f'is unknown; allowed: {", ".join(allowed)}')
         return not unknown
 
-    def number(self, key: str, value: Any, low: float = -math.inf,
-               high: float = math.inf) -> float:
+    def number(
+        self, key: str, value: Any, low: float = -math.inf, high: float = math.inf
+    ) -> float:
         try:
             if isinstance(value, bool):
                 raise ValueError
@@ -93,9 +94,7 @@ class _Reader:
         if 'duration' not in entry:
             self.wrong('duration', 'is missing; wants the length of the run in s')
         duration = self.number('duration', entry.get('duration', 0), 0, 1e9)
-        sources = {
-            key: self.source(key, entry[key], folder) for key in _SIGNALS if key in entry
-        }
+        sources = {key: self.source(key, entry[key], folder) for key in _SIGNALS if key in entry}
         faults = entry.get('faults') or []
         if not isinstance(faults, list):
             self.wrong('faults', f'wants a list of mappings with {", ".join(_FAULT_KEYS)}')
@@ -104,7 +103,9 @@ class _Reader:
         if len(self.errors) > before:
             return None
         return Scenario(
-            name, duration, str(entry.get('description', '')),
+            name,
+            duration,
+            str(entry.get('description', '')),
             faults=tuple(fault for fault in found if fault),
             **{key: source for key, source in sources.items() if source},
         )
@@ -177,8 +178,9 @@ def _recorded(reader: _Reader, key: str, entry: Any, folder: Path) -> Source | N
             reader.wrong(f'{key}.{name}', f'{entry.get(name)!r} is no text')
             return None
     scale = reader.number(f'{key}.scale', entry.get('scale', 1))
-    return read_recorded(folder / entry['file'], entry['column'], scale,
-                         bool(entry.get('hold', False)))
+    return read_recorded(
+        folder / entry['file'], entry['column'], scale, bool(entry.get('hold', False))
+    )
 
 
 def _level_loop(reader: _Reader, key: str, entry: Any, folder: Path) -> Source | None:

@@ -29,6 +29,7 @@ MODELS: dict[str, tuple[type[Actuator], ModuleType]] = {
 _BLOCK = 1 << 14
 """Ticks per call of the compiled loop: bounds memory, keeps the inputs in the cache."""
 
+
 class Simulator:
     """
     A plant that advances sample by sample; the size of the blocks does not change the result.
@@ -38,9 +39,15 @@ class Simulator:
     :ivar duration: of the scenario [s].
     """
 
-    def __init__(self, scenario: str | Scenario, rate: float | None = None,
-                 model: str | Actuator = 'dablib', noise: bool | str = False, seed: int = 0,
-                 duration: float | None = None) -> None:
+    def __init__(
+        self,
+        scenario: str | Scenario,
+        rate: float | None = None,
+        model: str | Actuator = 'dablib',
+        noise: bool | str = False,
+        seed: int = 0,
+        duration: float | None = None,
+    ) -> None:
         """
         Put the plant to the start of a scenario.
 
@@ -69,8 +76,11 @@ class Simulator:
         self._strengths = np.zeros(20)
         self._faults = [_admissible(fault, self.actuator) for fault in self.scenario.faults]
         if len(self._faults) > 1:
-            warnings.warn(f'{self.scenario.name}: the benchmark allows one fault at a time, '
-                          f'here are {len(self._faults)}', stacklevel=2)
+            warnings.warn(
+                f'{self.scenario.name}: the benchmark allows one fault at a time, '
+                f'here are {len(self._faults)}',
+                stacklevel=2,
+            )
         self._lay_out_faults()
         names = ('cv', 'p1', 'p2', 't1')
         self._sources: list[Source] = [
@@ -123,7 +133,7 @@ class Simulator:
         out = np.empty((1 + len(OUTPUTS), n))
         step = max(1, _BLOCK // self._every)
         for first in range(0, n, step):
-            self._fill(out[:, first:first + step])
+            self._fill(out[:, first : first + step])
         k = np.arange(self._done - n, self._done, dtype=np.int64)
         columns: Columns = {'stamp': stamps(k, self.rate)}
         columns.update(zip(('cv', *OUTPUTS), out, strict=True))
@@ -169,7 +179,7 @@ class Simulator:
         if self._loop:
             ticks = out.shape[1] * self._every
             parts = [self._run_loop(k, n) for k, n in self._periods(first, ticks)]
-            out[:] = np.concatenate(parts, axis=1)[:, ::self._every]
+            out[:] = np.concatenate(parts, axis=1)[:, :: self._every]
         else:
             out[:] = self._run(first, out.shape[1], self._every)[:-1]
         if self._disturbance and self._noisy_outputs:
@@ -192,8 +202,17 @@ class Simulator:
             hum = self._disturbance.hum(first, 1, len(t), self._tick_rate)
             inputs[0] = self._disturbance.disturb('cv', inputs[0], 1, hum)
         rows = np.empty((ROWS, n))  # contiguous, so that there is one compiled version
-        self._advance(self._state, self._constants, self._table, self._strengths, self._effects,
-                      inputs, self._tick_rate, every, rows)
+        self._advance(
+            self._state,
+            self._constants,
+            self._table,
+            self._strengths,
+            self._effects,
+            inputs,
+            self._tick_rate,
+            every,
+            rows,
+        )
         out[1:] = rows
         return out
 
@@ -219,9 +238,14 @@ class Simulator:
         return rows[:-1]
 
 
-def simulate(scenario: str | Scenario, rate: float | None = None,
-             model: str | Actuator = 'dablib', noise: bool | str = False, seed: int = 0,
-             duration: float | None = None) -> Run:
+def simulate(
+    scenario: str | Scenario,
+    rate: float | None = None,
+    model: str | Actuator = 'dablib',
+    noise: bool | str = False,
+    seed: int = 0,
+    duration: float | None = None,
+) -> Run:
     """
     Run a scenario from its start to its end.
 
@@ -261,11 +285,14 @@ def _admissible(fault: Fault, actuator: Actuator) -> Fault:
     kind = CATALOGUE[fault.fault]
     if actuator.model == 'lugre':
         if fault.fault == 'f8':
-            raise ValueError('fault: f8 scales the play, which the lugre model does not have; '
-                             'use model dablib')
+            raise ValueError(
+                'fault: f8 scales the play, which the lugre model does not have; use model dablib'
+            )
     elif not kind.minimum <= fault.direction * fault.strength <= 1:
-        raise ValueError(f'strength: {fault.direction * fault.strength:g} is not within '
-                         f'{kind.minimum:g}..1, the range of {fault.fault} on the dablib model')
+        raise ValueError(
+            f'strength: {fault.direction * fault.strength:g} is not within '
+            f'{kind.minimum:g}..1, the range of {fault.fault} on the dablib model'
+        )
     return fault
 
 
@@ -275,8 +302,10 @@ def _ticks(rate: float, model: str) -> tuple[float, int]:
     if model == 'dablib':
         every = round(dablib.RATE / rate)
         if every < 1 or not math.isclose(every * rate, dablib.RATE, rel_tol=1e-9):
-            raise ValueError(f'rate: {rate:g} Hz is not 400 Hz divided by a whole number '
-                             '(400, 200, 100, 80, 50, 40, 25, 20, 10, ... 1)')
+            raise ValueError(
+                f'rate: {rate:g} Hz is not 400 Hz divided by a whole number '
+                '(400, 200, 100, 80, 50, 40, 25, 20, 10, ... 1)'
+            )
         return dablib.RATE, every
     every = math.ceil(lugre.RATE / rate - 1e-9)
     return rate * every, every

@@ -50,9 +50,7 @@ def water_density(temperature: float) -> float:
     d = (t - 4.0) * (t - 4.0)
     if t < 30.0:
         return 1000.0 - d / 503570.0 * (t + 283.0) * 1000.0 / (t + 67.2)
-    return 1000.0 - d * (t + 273.0) * 1000.0 * (350.0 - t) / (
-        466700.0 * (t + 67.0) * (365.0 - t)
-    )
+    return 1000.0 - d * (t + 273.0) * 1000.0 * (350.0 - t) / (466700.0 * (t + 67.0) * (365.0 - t))
 
 
 @jit
@@ -83,8 +81,9 @@ def characteristic(xr: float) -> float:
 
 
 @jit
-def valve_flow(xr: float, p1: float, p2: float, pv: float, density: float,
-               a: Record, e: Record) -> float:
+def valve_flow(
+    xr: float, p1: float, p2: float, pv: float, density: float, a: Record, e: Record
+) -> float:
     """
     Evaluate the flow through valve and bypass.
 

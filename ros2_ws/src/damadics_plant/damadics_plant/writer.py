@@ -56,9 +56,13 @@ def _mcap(path: Path) -> Iterator[Write]:
         bag.add_topic('/fault_state', 'damadics_msgs/msg/FaultState', [qos(depth=1000)])
 
         def write(columns: Mapping[str, np.ndarray]) -> None:
-            bag.write_columns(columns['stamp'], {
-                '/measurement': {name: columns[name] for name in signals},
-                '/fault_state': {name: columns[name] for name in ('strength', 'fault')},
-            }, 'LC74_20')
+            bag.write_columns(
+                columns['stamp'],
+                {
+                    '/measurement': {name: columns[name] for name in signals},
+                    '/fault_state': {name: columns[name] for name in ('strength', 'fault')},
+                },
+                'LC74_20',
+            )
 
         yield write

@@ -23,9 +23,15 @@ def nominal():
     return simulate('paper_nominal')
 
 
-@pytest.mark.parametrize(('after', 'instant'), [
-    (0.0, 2.895), (30.5, 30.79), (50.5, 50.80), (80.2, 80.445),
-])
+@pytest.mark.parametrize(
+    ('after', 'instant'),
+    [
+        (0.0, 2.895),
+        (30.5, 30.79),
+        (50.5, 50.80),
+        (80.2, 80.445),
+    ],
+)
 def test_stem_breaks_away_on_time(nominal, after, instant):
     assert first_rise(nominal, after) == pytest.approx(instant, abs=SAMPLE)
 
@@ -65,9 +71,18 @@ def test_agrees_with_the_original_simulink_model():
     assert flow.std() < 0.0014
 
 
-@pytest.mark.parametrize(('t', 'x'), [
-    (3, 0.017), (10, 0.876), (20, 0.997), (30, 0.728), (60, 0.996), (70, 0.725), (80, 0.358),
-])
+@pytest.mark.parametrize(
+    ('t', 'x'),
+    [
+        (3, 0.017),
+        (10, 0.876),
+        (20, 0.997),
+        (30, 0.728),
+        (60, 0.996),
+        (70, 0.725),
+        (80, 0.358),
+    ],
+)
 def test_lugre_stem_position(t, x):
     run = simulate('paper_nominal', model='lugre')
     assert run.x1[200 * t] == pytest.approx(x, abs=6e-4)

@@ -28,8 +28,12 @@ def table(path):
 
 def start(*arguments):
     environment = os.environ | {'PYTHONPATH': os.pathsep.join(sys.path)}
-    return subprocess.Popen([sys.executable, '-m', 'damadics_plant.command', *arguments],
-                            env=environment, stderr=subprocess.PIPE, text=True)
+    return subprocess.Popen(
+        [sys.executable, '-m', 'damadics_plant.command', *arguments],
+        env=environment,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
 
 
 def wait_for(condition, what, seconds=60):
@@ -64,8 +68,10 @@ def test_mcap_has_the_run_bit_for_bit(tmp_path):
     out = tmp_path / 'a.mcap'
     assert main(['paper_friction', '--out', str(out)]) == 0
     run = simulate('paper_friction')
-    for topic, names in {'measurement': ('cv', 'x1', 'p1', 'p2', 't1', 'flow', 'ps'),
-                         'fault_state': ('fault', 'strength')}.items():
+    for topic, names in {
+        'measurement': ('cv', 'x1', 'p1', 'p2', 't1', 'flow', 'ps'),
+        'fault_state': ('fault', 'strength'),
+    }.items():
         columns = read_columns(out, topic)
         for name in ('stamp', *names):
             assert np.array_equal(columns[name], run[name]), name
@@ -73,11 +79,44 @@ def test_mcap_has_the_run_bit_for_bit(tmp_path):
 
 def test_fault_and_inputs_of_ones_own(tmp_path):
     out, again = tmp_path / 'a.csv', tmp_path / 'b.csv'
-    assert main(['--fault', 'f19', '--strength', '-0.4', '--from', '5', '--to', '8',
-                 '--duration', '10', '--rate', '1', '--out', str(out)]) == 0
+    assert (
+        main(
+            [
+                '--fault',
+                'f19',
+                '--strength',
+                '-0.4',
+                '--from',
+                '5',
+                '--to',
+                '8',
+                '--duration',
+                '10',
+                '--rate',
+                '1',
+                '--out',
+                str(out),
+            ]
+        )
+        == 0
+    )
     assert table(out)['strength'].tolist() == 5 * [0] + 3 * [-0.4] + 3 * [0]
-    assert main(['nominal', '--cv', f'{out}:x1*0.5', '--duration', '10', '--rate', '1',
-                 '--out', str(again)]) == 0
+    assert (
+        main(
+            [
+                'nominal',
+                '--cv',
+                f'{out}:x1*0.5',
+                '--duration',
+                '10',
+                '--rate',
+                '1',
+                '--out',
+                str(again),
+            ]
+        )
+        == 0
+    )
     assert table(again)['cv'] == pytest.approx(table(out)['x1'] * 0.5)
 
 
@@ -87,15 +126,18 @@ def test_lists(capsys):
     assert len(lines) == len(scenario_names()) + 19
 
 
-@pytest.mark.parametrize(('arguments', 'message'), [
-    (['f99_S', '--out', 'a.csv'], '--list'),
-    (['nominal', '--out', 'a.txt'], 'FILE.csv nor FILE.mcap'),
-    (['nominal', '--out', 'a.csv', '--rate', '300'], '400 Hz'),
-    (['nominal', '--out', 'a.csv', '--fault', 'f4', '--strength', '3'], '-1..1'),
-    (['nominal', '--out', 'a.csv', '--cv', 'nonsense'], 'FILE:COLUMN'),
-    (['nominal', '--out', 'no/folder/a.csv'], 'no/folder/a.csv'),
-    (['nominal', 'f1_S', '--out', 'folder', '--scada', 's.csv'], 'single scenario'),
-])
+@pytest.mark.parametrize(
+    ('arguments', 'message'),
+    [
+        (['f99_S', '--out', 'a.csv'], '--list'),
+        (['nominal', '--out', 'a.txt'], 'FILE.csv nor FILE.mcap'),
+        (['nominal', '--out', 'a.csv', '--rate', '300'], '400 Hz'),
+        (['nominal', '--out', 'a.csv', '--fault', 'f4', '--strength', '3'], '-1..1'),
+        (['nominal', '--out', 'a.csv', '--cv', 'nonsense'], 'FILE:COLUMN'),
+        (['nominal', '--out', 'no/folder/a.csv'], 'no/folder/a.csv'),
+        (['nominal', 'f1_S', '--out', 'folder', '--scada', 's.csv'], 'single scenario'),
+    ],
+)
 def test_error_is_one_line(arguments, message, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main(arguments) == 1
@@ -116,9 +158,12 @@ def test_full_disk_is_foreseen(tmp_path, monkeypatch, capsys):
 def test_many_scenarios_go_to_a_folder(tmp_path):
     assert main(['paper_friction', 'f1_S', '--rate', '1', '--out', str(tmp_path / 'runs')]) == 0
     assert {path.name for path in (tmp_path / 'runs').iterdir()} == {
-        'paper_friction.csv', 'f1_S.csv'}
-    assert np.array_equal(table(tmp_path / 'runs' / 'f1_S.csv')['flow'],
-                          simulate('f1_S', rate=1).flow)
+        'paper_friction.csv',
+        'f1_S.csv',
+    }
+    assert np.array_equal(
+        table(tmp_path / 'runs' / 'f1_S.csv')['flow'], simulate('f1_S', rate=1).flow
+    )
 
 
 def test_readme_pictures_are_drawn(tmp_path):
@@ -142,8 +187,9 @@ def test_interrupt_leaves_valid_files(tmp_path, names):
     out = tmp_path / 'a.csv' if len(names) == 1 else tmp_path / 'runs'
     process = start(*names, '--out', str(out))
     try:
-        wait_for(lambda: any(path.stat().st_size > 10**6 for path in tmp_path.rglob('*.csv')),
-                 'output')
+        wait_for(
+            lambda: any(path.stat().st_size > 10**6 for path in tmp_path.rglob('*.csv')), 'output'
+        )
         process.send_signal(signal.SIGINT)
         _, error = process.communicate(timeout=30)
     finally:

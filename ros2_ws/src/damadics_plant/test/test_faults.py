@@ -25,9 +25,18 @@ def test_catalogue_is_complete():
     assert all(kind.meaning and kind.injection for kind in CATALOGUE.values())
 
 
-@pytest.mark.parametrize(('t', 'strength'), [
-    (69.99, 0), (70, 0), (75, 0.2), (80, 0.4), (90, 0.8), (99.9, 0.8), (100, 0),
-])
+@pytest.mark.parametrize(
+    ('t', 'strength'),
+    [
+        (69.99, 0),
+        (70, 0),
+        (75, 0.2),
+        (80, 0.4),
+        (90, 0.8),
+        (99.9, 0.8),
+        (100, 0),
+    ],
+)
 def test_incipient_fault_follows_its_time_course(t, strength):
     assert Fault('f4', 0.8, start=70, development=20, end=100).at(t) == pytest.approx(strength)
 
@@ -37,15 +46,18 @@ def test_abrupt_fault_acts_from_its_first_instant():
     assert Fault('f12', 0.5, start=70, direction=-1).at(70) == -0.5
 
 
-@pytest.mark.parametrize(('arguments', 'message'), [
-    ({'fault': 'f20'}, 'f1..f19'),
-    ({'fault': 'f1', 'strength': -0.5}, r'0..1'),
-    ({'fault': 'f4', 'strength': 1.5}, r'-1..1'),
-    ({'fault': 'f4', 'direction': 2}, 'direction'),
-    ({'fault': 'f4', 'start': -1}, 'from'),
-    ({'fault': 'f4', 'start': 5, 'end': 5}, 'to'),
-    ({'fault': 'f4', 'development': float('nan')}, 'development'),
-])
+@pytest.mark.parametrize(
+    ('arguments', 'message'),
+    [
+        ({'fault': 'f20'}, 'f1..f19'),
+        ({'fault': 'f1', 'strength': -0.5}, r'0..1'),
+        ({'fault': 'f4', 'strength': 1.5}, r'-1..1'),
+        ({'fault': 'f4', 'direction': 2}, 'direction'),
+        ({'fault': 'f4', 'start': -1}, 'from'),
+        ({'fault': 'f4', 'start': 5, 'end': 5}, 'to'),
+        ({'fault': 'f4', 'development': float('nan')}, 'development'),
+    ],
+)
 def test_bad_fault_is_refused(arguments, message):
     with pytest.raises(ValueError, match=message):
         Fault(**arguments)
@@ -70,8 +82,10 @@ def test_f3_lets_more_through():
 
 def test_f4_holds_the_stem_back():
     cv = Steps((0, 30), (0.5, 0.4))
-    runs = [simulate(Scenario('test', STILL, cv=cv, faults=faults), rate=1)
-            for faults in ((), (Fault('f4', 0.5, start=29),))]
+    runs = [
+        simulate(Scenario('test', STILL, cv=cv, faults=faults), rate=1)
+        for faults in ((), (Fault('f4', 0.5, start=29),))
+    ]
     assert runs[1].x1[32] - runs[0].x1[32] > 0.05
 
 

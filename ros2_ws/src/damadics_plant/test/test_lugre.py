@@ -26,8 +26,14 @@ def derivatives(t, y, cv, opening, d1, d2):
     dz = v - 1e6 * abs(v) / g * z
     friction = (1 + d1(t)) * (1e6 * z + 1000 * dz + 1500 * v)
     dv = (u - 60892 * (1 + d2(t)) * (x + 0.009525) - friction) / 2
-    return [(cv - y1) / 0.3, (y1 - y2) / 0.3,
-            2.5e-6 * abs(opening) * np.sign(drop) * np.sqrt(abs(drop)), dv, v, dz]
+    return [
+        (cv - y1) / 0.3,
+        (y1 - y2) / 0.3,
+        2.5e-6 * abs(opening) * np.sign(drop) * np.sqrt(abs(drop)),
+        dv,
+        v,
+        dz,
+    ]
 
 
 def before(strength, end):
@@ -43,39 +49,52 @@ def radau(state, seconds, d1, d2):
     samples = [y[4] / 0.0381]
     for begin, end in zip(ticks, ticks[1:], strict=False):
         cvi = np.clip(100 * (y[1] - y[4] / 0.0381), -1, 1)
-        opening = np.interp(cvi, [-1, -0.94, -0.54, 0.46, 0.86, 1],
-                            [-0.55, -0.55, -0.02, 0.02, 1, 1])
+        opening = np.interp(
+            cvi, [-1, -0.94, -0.54, 0.46, 0.86, 1], [-0.55, -0.55, -0.02, 0.02, 1, 1]
+        )
         cuts = [begin, *(t for t in switches if begin + 1e-9 < t < end - 1e-9), end]
         for a, b in zip(cuts, cuts[1:], strict=False):
             cv = CV.at(np.array([a + 1e-6]))[0]
             grid = np.arange(round(a * 200), round(b * 200) + 1) / 200
-            solution = solve_ivp(derivatives, (a, b), y, 'Radau', t_eval=np.clip(grid, a, b),
-                                 args=(cv, opening, *(before(d, b) for d in (d1, d2))), rtol=1e-9,
-                                 atol=[1e-12, 1e-12, 1e-15, 1e-12, 1e-13, 1e-15])
+            solution = solve_ivp(
+                derivatives,
+                (a, b),
+                y,
+                'Radau',
+                t_eval=np.clip(grid, a, b),
+                args=(cv, opening, *(before(d, b) for d in (d1, d2))),
+                rtol=1e-9,
+                atol=[1e-12, 1e-12, 1e-15, 1e-12, 1e-13, 1e-15],
+            )
             assert solution.success
             y = list(solution.y[:, -1])
             samples += list(solution.y[4, 1:] / 0.0381)
     return np.array(samples)
 
 
-@pytest.mark.parametrize('fault', [
-    None,
-    Fault('f4', 0.3, start=10, development=2),
-    Fault('f11', 0.5, start=10, development=3),
-    Fault('f11', -0.5, start=11),
-    Fault('f11', 0.5, start=11),
-], ids=str)
+@pytest.mark.parametrize(
+    'fault',
+    [
+        None,
+        Fault('f4', 0.3, start=10, development=2),
+        Fault('f11', 0.5, start=10, development=3),
+        Fault('f11', -0.5, start=11),
+        Fault('f11', 0.5, start=11),
+    ],
+    ids=str,
+)
 def test_agrees_with_radau(fault):
     seconds = 3.5
     scenario = Scenario('test', BEGIN + seconds, cv=CV, faults=(fault,) if fault else ())
     simulator = Simulator(scenario, rate=200, model='lugre')
     simulator.advance(round(BEGIN * 200))
-    strength = [fault.at if fault and fault.fault == name else lambda t: 0.0
-                for name in ('f4', 'f11')]
+    strength = [
+        fault.at if fault and fault.fault == name else lambda t: 0.0 for name in ('f4', 'f11')
+    ]
     reference = radau(simulator._state[0], seconds, lambda t: 20 * strength[0](t), strength[1])
     x = simulator.advance(10_000)['x1']
     assert np.ptp(reference) > 0.01
-    assert np.abs(x - reference[:len(x)]).max() < 3e-4
+    assert np.abs(x - reference[: len(x)]).max() < 3e-4
 
 
 @pytest.mark.parametrize(('h', 'friction'), [(2.5e-3, 1), (1e-3, 21)])
@@ -85,7 +104,8 @@ def test_explicit_schemes_diverge(h, friction):
     with np.errstate(all='ignore'):
         for _ in range(400):
             y = y + h * np.array(
-                derivatives(0, y, 0.7, 0.01, lambda t: friction - 1, lambda t: 0.0))
+                derivatives(0, y, 0.7, 0.01, lambda t: friction - 1, lambda t: 0.0)
+            )
     assert not np.abs(y[3]) < 1
 
 

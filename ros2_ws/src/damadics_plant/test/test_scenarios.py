@@ -12,8 +12,24 @@ from damadics_plant.scenario import Scenario
 
 DATA = Path(__file__).parents[5] / 'shared' / 'data'
 MODES = {  # tables 28 and 29 of DABLib's manual
-    1: 'SMB', 2: 'BI', 3: 'I', 4: 'I', 5: 'I', 6: 'I', 7: 'SMB', 8: 'SMB', 9: 'I', 10: 'SMB',
-    11: 'BI', 12: 'SMB', 13: 'SMBI', 14: 'SMB', 15: 'B', 16: 'SMB', 17: 'BI', 18: 'SMBI',
+    1: 'SMB',
+    2: 'BI',
+    3: 'I',
+    4: 'I',
+    5: 'I',
+    6: 'I',
+    7: 'SMB',
+    8: 'SMB',
+    9: 'I',
+    10: 'SMB',
+    11: 'BI',
+    12: 'SMB',
+    13: 'SMBI',
+    14: 'SMB',
+    15: 'B',
+    16: 'SMB',
+    17: 'BI',
+    18: 'SMBI',
     19: 'SMB',
 }
 STRENGTH = {'S': 0.25, 'M': 0.5, 'B': 0.75, 'I': 1.0}
@@ -23,9 +39,10 @@ def test_standard_scenarios():
     standard = {f'f{fault}_{mode}' for fault, modes in MODES.items() for mode in modes}
     assert len(standard) == 44
     assert standard | {'nominal', 'paper_nominal', 'paper_friction', 'paper_spring'} <= set(
-        scenario_names())
+        scenario_names()
+    )
     for name in standard:
-        fault, = load_scenario(name).faults
+        (fault,) = load_scenario(name).faults
         kind, mode = name.split('_')
         hours = {'f4': 3600, 'f13': 900, 'f17': 3600}
         assert fault.fault == kind
@@ -41,7 +58,7 @@ def test_every_scenario_says_what_it_is():
 
 
 def test_fault_of_any_strength_by_name():
-    fault, = load_scenario('f12@-0.37').faults
+    (fault,) = load_scenario('f12@-0.37').faults
     assert (fault.fault, fault.strength, fault.start) == ('f12', -0.37, 900)
 
 
@@ -64,24 +81,27 @@ random: {<<: *base, cv: {random_steps: {low: 0.2, high: 0.4, seed: 3}}}
         load_scenario(str(file))
 
 
-@pytest.mark.parametrize(('text', 'message'), [
-    ('a: {duration: 10, cw: 1}', 'cw: is unknown; allowed: description, duration, cv'),
-    ('a: {cv: 1}', 'duration: is missing'),
-    ('a: {duration: ten}', "duration: 'ten' is no number"),
-    ('a: {duration: -1}', 'not within 0'),
-    ('a: {duration: 1, cv: {square: 1}}', 'steps, sine, random_steps, recorded, level_loop'),
-    ('a: {duration: 1, cv: {steps: [[0, 1], [0, 2]]}}', 'times must increase'),
-    ('a: {duration: 1, cv: {steps: 1}}', r'wants a list of \[time in s, value\]'),
-    ('a: {duration: 1, cv: {sine: {means: 1}}}', 'cv.sine.means: is unknown; allowed: mean'),
-    ('a: {duration: 1, p1: {level_loop: }}', 'level_loop drives cv only'),
-    ('a: {duration: 1, cv: {recorded: {file: no.csv, column: x}}}', 'cannot be read'),
-    ('a: {duration: 1, faults: {fault: f1}}', 'faults: wants a list'),
-    ('a: {duration: 1, faults: [{fault: f20}]}', r"faults\[0\].fault: 'f20' is not one of f1"),
-    ('a: {duration: 1, faults: [{fault: f1, strength: 2}]}', '2 is not within 0..1'),
-    ('a: {duration: 1, faults: [{fault: f1, form: 2}]}', 'form: is unknown; allowed: fault'),
-    ('[1, 2]', 'mapping of scenario names'),
-    ('a: {', 'is no YAML'),
-])
+@pytest.mark.parametrize(
+    ('text', 'message'),
+    [
+        ('a: {duration: 10, cw: 1}', 'cw: is unknown; allowed: description, duration, cv'),
+        ('a: {cv: 1}', 'duration: is missing'),
+        ('a: {duration: ten}', "duration: 'ten' is no number"),
+        ('a: {duration: -1}', 'not within 0'),
+        ('a: {duration: 1, cv: {square: 1}}', 'steps, sine, random_steps, recorded, level_loop'),
+        ('a: {duration: 1, cv: {steps: [[0, 1], [0, 2]]}}', 'times must increase'),
+        ('a: {duration: 1, cv: {steps: 1}}', r'wants a list of \[time in s, value\]'),
+        ('a: {duration: 1, cv: {sine: {means: 1}}}', 'cv.sine.means: is unknown; allowed: mean'),
+        ('a: {duration: 1, p1: {level_loop: }}', 'level_loop drives cv only'),
+        ('a: {duration: 1, cv: {recorded: {file: no.csv, column: x}}}', 'cannot be read'),
+        ('a: {duration: 1, faults: {fault: f1}}', 'faults: wants a list'),
+        ('a: {duration: 1, faults: [{fault: f20}]}', r"faults\[0\].fault: 'f20' is not one of f1"),
+        ('a: {duration: 1, faults: [{fault: f1, strength: 2}]}', '2 is not within 0..1'),
+        ('a: {duration: 1, faults: [{fault: f1, form: 2}]}', 'form: is unknown; allowed: fault'),
+        ('[1, 2]', 'mapping of scenario names'),
+        ('a: {', 'is no YAML'),
+    ],
+)
 def test_error_names_file_key_and_what_is_allowed(tmp_path, text, message):
     file = tmp_path / 'wrong.yaml'
     file.write_text(text)
@@ -117,8 +137,11 @@ def test_follows_the_real_valve():
         pytest.skip(f'{file} is not here: its licence keeps it out of the repository')
     real = np.genfromtxt(file, delimiter=',', names=True)
     scenario = Scenario(
-        'Lublin', real['t_s'][-1], cv=read_recorded(file, 'LC74_20CV_CV_pct', 0.01),
-        p1=read_recorded(file, 'P74_00_P1_kPa', 1e3), p2=read_recorded(file, 'P74_01_P2_kPa', 1e3),
+        'Lublin',
+        real['t_s'][-1],
+        cv=read_recorded(file, 'LC74_20CV_CV_pct', 0.01),
+        p1=read_recorded(file, 'P74_00_P1_kPa', 1e3),
+        p2=read_recorded(file, 'P74_01_P2_kPa', 1e3),
         t1=read_recorded(file, 'T74_00_T1_degC'),
     )
     error = (simulate(scenario, rate=1).x1 - real['L74_20X_X_pct'] / 100)[30:]

@@ -78,10 +78,19 @@ def test_two_random_inputs_differ():
     assert not np.array_equal(run.cv, run.t1)
 
 
-@pytest.mark.parametrize(('model', 'values'), [
-    ('dablib', [0.04875771072716806, 0.23100571226817979, 3489386.3531229743, 162129.902315901]),
-    ('lugre', [0.04875771072716806, 0.2486307297231431, 3495982.5781912585, 173515.0544567246]),
-])
+@pytest.mark.parametrize(
+    ('model', 'values'),
+    [
+        (
+            'dablib',
+            [0.04875771072716806, 0.23100571226817979, 3489386.3531229743, 162129.902315901],
+        ),
+        (
+            'lugre',
+            [0.04875771072716806, 0.2486307297231431, 3495982.5781912585, 173515.0544567246],
+        ),
+    ],
+)
 def test_seed_means_the_same_on_every_python(model, values):
     run = simulate('random_friction', rate=1, model=model, noise=True, seed=5)
     assert [run.cv[40], run.x1[40], run.p1[50], run.ps[111]] == pytest.approx(values, rel=1e-9)
@@ -120,14 +129,17 @@ def test_inject_clear_and_override():
         Simulator('paper_nominal', model='lugre').inject('f8')
 
 
-@pytest.mark.parametrize(('arguments', 'message'), [
-    ({'scenario': 'f4_X'}, '--list'),
-    ({'scenario': 'nominal', 'rate': 300}, '400 Hz'),
-    ({'scenario': 'nominal', 'rate': 0}, 'rate'),
-    ({'scenario': 'nominal', 'model': 'karnopp'}, 'dablib, lugre'),
-    ({'scenario': 'nominal', 'noise': 'x1'}, 'noise'),
-    ({'scenario': 'nominal', 'duration': float('inf')}, 'duration'),
-])
+@pytest.mark.parametrize(
+    ('arguments', 'message'),
+    [
+        ({'scenario': 'f4_X'}, '--list'),
+        ({'scenario': 'nominal', 'rate': 300}, '400 Hz'),
+        ({'scenario': 'nominal', 'rate': 0}, 'rate'),
+        ({'scenario': 'nominal', 'model': 'karnopp'}, 'dablib, lugre'),
+        ({'scenario': 'nominal', 'noise': 'x1'}, 'noise'),
+        ({'scenario': 'nominal', 'duration': float('inf')}, 'duration'),
+    ],
+)
 def test_bad_argument_is_refused(arguments, message):
     with pytest.raises(ValueError, match=message):
         simulate(**arguments)
@@ -141,14 +153,21 @@ def test_many_runs_come_in_order():
 
 FAULTS = st.sampled_from(list(CATALOGUE.values())).flatmap(
     lambda kind: st.builds(
-        Fault, st.just(kind.key), st.floats(kind.minimum, 1), st.floats(0, 20), st.floats(0, 20),
-    ))
+        Fault,
+        st.just(kind.key),
+        st.floats(kind.minimum, 1),
+        st.floats(0, 20),
+        st.floats(0, 20),
+    )
+)
 
 
 @settings(max_examples=60, deadline=None, derandomize=True)
 @given(
-    cv=st.lists(st.floats(0, 1), min_size=6, max_size=6), fault=FAULTS,
-    model=st.sampled_from(MODELS), noise=st.booleans(),
+    cv=st.lists(st.floats(0, 1), min_size=6, max_size=6),
+    fault=FAULTS,
+    model=st.sampled_from(MODELS),
+    noise=st.booleans(),
 )
 def test_outputs_are_in_range_for_any_input(cv, fault, model, noise):
     if fault.fault == 'f8':
@@ -159,8 +178,10 @@ def test_outputs_are_in_range_for_any_input(cv, fault, model, noise):
     for name, span in RANGES.items():
         assert np.all((run[name] >= 0) & (run[name] <= span)), name
     assert np.all(np.isfinite(run['ps']))
-    assert np.all((run['ps'] * (fault.fault != 'f14') >= -101325 - 500)
-                  & (run['ps'] * (fault.fault != 'f14') <= 700e3))
+    assert np.all(
+        (run['ps'] * (fault.fault != 'f14') >= -101325 - 500)
+        & (run['ps'] * (fault.fault != 'f14') <= 700e3)
+    )
     state = simulator._state[0]
     assert 0 < state['ma'] <= 0.1
     assert -0.05 * 0.0381 <= state['x'] <= 1.25 * 0.0381
@@ -168,12 +189,15 @@ def test_outputs_are_in_range_for_any_input(cv, fault, model, noise):
 
 @pytest.mark.parametrize('model', MODELS)
 def test_same_source_runs_uncompiled(model):
-    code = ('from damadics_plant import simulate; '
-            f'run = simulate("paper_friction", model={model!r}, rate=50, duration=4); '
-            'print(run.x1.tolist())')
+    code = (
+        'from damadics_plant import simulate; '
+        f'run = simulate("paper_friction", model={model!r}, rate=50, duration=4); '
+        'print(run.x1.tolist())'
+    )
     environment = os.environ | {'NUMBA_DISABLE_JIT': '1', 'PYTHONPATH': os.pathsep.join(sys.path)}
-    output = subprocess.run([sys.executable, '-c', code], env=environment, check=True,
-                            capture_output=True, text=True).stdout
+    output = subprocess.run(
+        [sys.executable, '-c', code], env=environment, check=True, capture_output=True, text=True
+    ).stdout
     plain = [float(x) for x in output.strip('[]\n').split(',')]
     compiled = simulate('paper_friction', model=model, rate=50, duration=4).x1
     assert plain == pytest.approx(compiled, abs=1e-9)

@@ -19,10 +19,21 @@ from damadics_evaluate.baselines.scada import FlowThreshold, ModelThreshold, Sca
 DETECTORS: dict[str, type[Detector]] = {
     kind.name: kind
     for kind in (
-        Scada, FixedThreshold, Ewma, CusumOnDeviation, FirCusum, Glr, SmartPositioner,
-        InnovationEkf, PageHinkley, Adwin, PrincipalComponents, IsolationForest,
-        ModelThreshold, FlowThreshold,
+        Scada,
+        FixedThreshold,
+        Ewma,
+        CusumOnDeviation,
+        FirCusum,
+        Glr,
+        SmartPositioner,
+        InnovationEkf,
+        PageHinkley,
+        Adwin,
+        PrincipalComponents,
+        IsolationForest,
+        ModelThreshold,
+        FlowThreshold,
     )
-}  # fmt: skip
+}
 
 __all__ = ['DETECTORS', 'Detector', 'MissingPackageError']

@@ -183,5 +183,3 @@ class FrictionSpringEkf:
         mean = states[learn].mean(axis=0)
         spread = np.maximum(states[learn].std(axis=0), 1e-3)
         return np.asarray((np.abs(states - mean) / spread).max(axis=1))
-
-

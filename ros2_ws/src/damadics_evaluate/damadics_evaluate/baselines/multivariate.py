@@ -25,8 +25,10 @@ LAGS = 3
 def features(samples: Floats) -> Floats:
     """Return the six signals and their last two samples, one row per sample."""
     signals = np.nan_to_num(samples[:, SIGNALS])
-    lagged = [np.vstack((np.repeat(signals[:1], i, axis=0), signals[: len(signals) - i]))
-              for i in range(LAGS)]  # fmt: skip
+    lagged = [
+        np.vstack((np.repeat(signals[:1], i, axis=0), signals[: len(signals) - i]))
+        for i in range(LAGS)
+    ]
     return np.hstack(lagged)
 
 

@@ -16,8 +16,13 @@ if TYPE_CHECKING:
     from damadics_fd.bag.writer import BagWriter, write_columns
 
 __all__ = ['BagError', 'BagWriter', 'iter_columns', 'read_columns', 'write_columns']
-_HOMES = {'BagError': 'errors', 'BagWriter': 'writer', 'write_columns': 'writer',
-          'iter_columns': 'columns', 'read_columns': 'columns'}
+_HOMES = {
+    'BagError': 'errors',
+    'BagWriter': 'writer',
+    'write_columns': 'writer',
+    'iter_columns': 'columns',
+    'read_columns': 'columns',
+}
 
 
 def __getattr__(name: str) -> Any:

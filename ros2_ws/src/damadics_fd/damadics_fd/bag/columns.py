@@ -27,8 +27,12 @@ MOST_PER_BYTE = 2  # messages that a file may announce before memory is taken fo
 
 
 def read_columns(
-    path: str | Path, topic: str = '/measurement', fields: Sequence[str] | None = None, *,
-    on_problem: Callable[[str], None] | None = None, limits: Limits = Limits(),  # noqa: B008
+    path: str | Path,
+    topic: str = '/measurement',
+    fields: Sequence[str] | None = None,
+    *,
+    on_problem: Callable[[str], None] | None = None,
+    limits: Limits = Limits(),
 ) -> Columns:
     """
     Read one topic of a bag.
@@ -78,8 +82,12 @@ def _read_whole(
 
 
 def iter_columns(
-    path: str | Path, topic: str = '/measurement', fields: Sequence[str] | None = None, *,
-    on_problem: Callable[[str], None] | None = None, limits: Limits = Limits(),  # noqa: B008
+    path: str | Path,
+    topic: str = '/measurement',
+    fields: Sequence[str] | None = None,
+    *,
+    on_problem: Callable[[str], None] | None = None,
+    limits: Limits = Limits(),
 ) -> Iterator[Columns]:
     """
     Read one topic of a bag chunk by chunk, in memory that does not grow with the bag.
@@ -115,7 +123,9 @@ def iter_columns(
 
 
 def open_files(
-    path: str | Path, on_problem: Callable[[str], None] | None, limits: Limits = Limits(),  # noqa: B008
+    path: str | Path,
+    on_problem: Callable[[str], None] | None,
+    limits: Limits = Limits(),
 ) -> Iterator[McapFile]:
     """
     Open the files of a bag one after the other.
@@ -140,7 +150,11 @@ def open_files(
 
 
 def _decoded(
-    mcap: McapFile, at: int, data: NDArray[np.uint8], topic: str, fields: Sequence[str] | None,
+    mcap: McapFile,
+    at: int,
+    data: NDArray[np.uint8],
+    topic: str,
+    fields: Sequence[str] | None,
     decoders: dict[int, Decoder],
 ) -> Iterator[Columns]:
     """Decode the messages of a topic in a chunk; `decoders` gets those of its channels."""

@@ -76,7 +76,7 @@ class Report:
         return LOSSY if self.messages else UNUSABLE
 
 
-def inspect(path: str | Path, limits: Limits = Limits()) -> Report:  # noqa: B008
+def inspect(path: str | Path, limits: Limits = Limits()) -> Report:
     """
     Read a bag to its end and check everything that can be checked.
 
@@ -158,7 +158,11 @@ def _stamp_decoder(mcap: McapFile, number: int) -> Decoder | None:
 
 
 def _note(
-    report: Report, mcap: McapFile, number: int, batch: Batch, rows: NDArray[np.bool_],
+    report: Report,
+    mcap: McapFile,
+    number: int,
+    batch: Batch,
+    rows: NDArray[np.bool_],
     decoders: dict[int, Decoder | None],
 ) -> None:
     log_time = batch.log_times(rows)
@@ -186,11 +190,11 @@ def _check_index(mcap: McapFile, batch: Batch) -> None:
         content = struct.pack('<HI', number, pairs.nbytes)
         size = HEAD.size + len(content) + pairs.nbytes
         found = mcap.read_bytes(at, size)
-        same = found[:HEAD.size] == HEAD.pack(Op.MESSAGE_INDEX, size - HEAD.size) and (
-            found[HEAD.size:HEAD.size + 6] == content
+        same = found[: HEAD.size] == HEAD.pack(Op.MESSAGE_INDEX, size - HEAD.size) and (
+            found[HEAD.size : HEAD.size + 6] == content
         )
         if same:  # the entries may be in any order
-            listed = np.frombuffer(found[HEAD.size + 6:], '<u8').reshape(-1, 2)
+            listed = np.frombuffer(found[HEAD.size + 6 :], '<u8').reshape(-1, 2)
             same = bool((np.sort(listed[:, 1]) == pairs[:, 1]).all()) and bool(
                 (listed[np.argsort(listed[:, 1]), 0] == pairs[:, 0]).all()
             )

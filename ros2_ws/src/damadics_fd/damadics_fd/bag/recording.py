@@ -121,9 +121,12 @@ class Recording:
         if not {'cv', 'x1'} <= parsed.keys():
             raise BagError('--map must name at least cv and x1', self.path)
         read = {
-            topic: read_columns(self.path, topic, sorted({
-                name for other, name, _ in parsed.values() if other == topic
-            }), on_problem=on_problem)
+            topic: read_columns(
+                self.path,
+                topic,
+                sorted({name for other, name, _ in parsed.values() if other == topic}),
+                on_problem=on_problem,
+            )
             for topic in {topic for topic, _, _ in parsed.values()}
         }
         base = _time(read[parsed['x1'][0]])
@@ -153,8 +156,11 @@ def hold(stamp: NDArray, values: NDArray, at: NDArray) -> NDArray:
 
 
 def find_recordings(
-    paths: Sequence[str | Path], topic: str | None = None, maps: Mapping = {},  # noqa: B006
-    actuator: int | None = None, on_problem: Callable[[BagError], None] | None = None,
+    paths: Sequence[str | Path],
+    topic: str | None = None,
+    maps: Mapping = {},
+    actuator: int | None = None,
+    on_problem: Callable[[BagError], None] | None = None,
 ) -> list[Recording]:
     """
     List every valve in files, bags and folders.
@@ -216,8 +222,11 @@ def _recordings(
     except BagError as error:
         problems.append(error)
         return []
-    problems += [NoMeasurementError(f'the topic {name} is empty', path)
-                 for name, count in topics.items() if not count]
+    problems += [
+        NoMeasurementError(f'the topic {name} is empty', path)
+        for name, count in topics.items()
+        if not count
+    ]
     return [Recording(path, name) for name, count in topics.items() if count]
 
 
@@ -246,12 +255,14 @@ def measurement_topics(path: Path) -> dict[str, int]:
     if damage and not kinds:
         raise BagError(f'{damage[0]}, and nothing in it can be read', path)
     topics = {
-        topic: counts[topic] for topic, kind in sorted(kinds.items())
+        topic: counts[topic]
+        for topic, kind in sorted(kinds.items())
         if kind == MEASUREMENT or topic.rsplit('/', 1)[-1] == 'measurement'
     }
     if not topics:
         raise NoMeasurementError(
             f'has no measurement; it has {", ".join(sorted(kinds)) or "no topic"}. Name the'
-            ' signals: --map cv=/topic.field --map x1=/topic.field', path,
+            ' signals: --map cv=/topic.field --map x1=/topic.field',
+            path,
         )
     return topics

@@ -16,8 +16,11 @@ METADATA_ROOT = 'rosbag2_bagfile_information'
 
 
 def qos(
-    reliability: str = 'reliable', durability: str = 'volatile', history: str = 'keep_last',
-    depth: int = 10, **other: Any,
+    reliability: str = 'reliable',
+    durability: str = 'volatile',
+    history: str = 'keep_last',
+    depth: int = 10,
+    **other: Any,
 ) -> QosProfile:
     """
     Describe an offered quality of service as rosbag2 writes it.
@@ -25,9 +28,15 @@ def qos(
     :param other: `deadline`, `lifespan`, `liveliness`, `liveliness_lease_duration`.
     """
     profile = {
-        'history': history, 'depth': depth, 'reliability': reliability, 'durability': durability,
-        'deadline': INFINITE, 'lifespan': INFINITE, 'liveliness': 'automatic',
-        'liveliness_lease_duration': INFINITE, 'avoid_ros_namespace_conventions': False,
+        'history': history,
+        'depth': depth,
+        'reliability': reliability,
+        'durability': durability,
+        'deadline': INFINITE,
+        'lifespan': INFINITE,
+        'liveliness': 'automatic',
+        'liveliness_lease_duration': INFINITE,
+        'avoid_ros_namespace_conventions': False,
     }
     return profile | other
 

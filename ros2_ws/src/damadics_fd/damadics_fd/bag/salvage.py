@@ -18,7 +18,7 @@ from damadics_fd.bag.sources import bag_files
 from damadics_fd.bag.writer import WholeWrites
 
 
-def salvage(path: str | Path, out: str | Path, limits: Limits = Limits()) -> Report:  # noqa: B008
+def salvage(path: str | Path, out: str | Path, limits: Limits = Limits()) -> Report:
     """
     Copy what is intact.
 
@@ -95,7 +95,7 @@ def _write(
     log_times = batch.log_times(rows)
     begins, ends = batch.starts[rows] - 31, batch.starts[rows] + batch.sizes[rows]
     if (begins[1:] == ends[:-1]).all():
-        data = batch.data[begins[0]:ends[-1]].tobytes()
+        data = batch.data[begins[0] : ends[-1]].tobytes()
     else:
         data = b''.join(batch.data[a:b].tobytes() for a, b in zip(begins, ends, strict=True))
     sizes = ends - begins
@@ -118,5 +118,9 @@ def _topic(mcap: McapFile, number: int) -> Topic:
     except yaml.YAMLError:
         offered = None
     profiles = [p for p in offered if isinstance(p, dict)] if isinstance(offered, list) else []
-    return Topic(channel.topic, schema.name if schema else '', profiles,
-                 channel.metadata.get('topic_type_hash', ''))
+    return Topic(
+        channel.topic,
+        schema.name if schema else '',
+        profiles,
+        channel.metadata.get('topic_type_hash', ''),
+    )

@@ -20,7 +20,7 @@ def is_mcap(path: Path) -> bool:
 
 def _by_number(path: Path) -> tuple[str, int]:
     number = re.search(r'_(\d+)\.mcap', path.name)
-    return (path.name[:number.start()], int(number[1])) if number else (path.name, -1)
+    return (path.name[: number.start()], int(number[1])) if number else (path.name, -1)
 
 
 def bag_files(path: str | Path) -> list[Path]:
@@ -43,8 +43,10 @@ def bag_files(path: str | Path) -> list[Path]:
     if not files:
         foreign = next(path.glob('*.db3'), None)
         raise BagError(
-            'is an SQLite bag; convert it: ros2 bag convert with storage_id mcap' if foreign
-            else 'holds no .mcap file; give a bag, or a folder of bags', path,
+            'is an SQLite bag; convert it: ros2 bag convert with storage_id mcap'
+            if foreign
+            else 'holds no .mcap file; give a bag, or a folder of bags',
+            path,
         )
     return files
 
@@ -81,6 +83,9 @@ def _bags_within(folder: Path) -> list[Path]:
     numbered = len(names) == 1 and all(_by_number(file)[1] >= 0 for file in files)
     if numbered and (len(files) > 1 or folder.name in names):
         files = [folder]  # a split bag, or one that a crash left without metadata.yaml
-    inner = [entry for entry in entries if entry.is_dir() and not entry.is_symlink()
-             and not entry.name.startswith('.')]
+    inner = [
+        entry
+        for entry in entries
+        if entry.is_dir() and not entry.is_symlink() and not entry.name.startswith('.')
+    ]
     return [*files, *(bag for entry in inner for bag in _bags_within(entry))]

@@ -19,26 +19,52 @@ ROWS = 100_000  # read at a time
 SECOND = 1e9  # [ns]
 KPA, PERCENT, TPH, M3H = 1e3, 1e-2, 1 / 3.6, 1 / 3.6  # to SI; m3/h as if the medium were water
 _TIME = {'t': SECOND, 't_s': SECOND, 'time': SECOND, 'time_s': SECOND, 'stamp': 1.0}
-_OWN = {name: (name, 1.0) for name in ('cv', 'x1', 'p1', 'p2', 't1', 'flow', 'ps', 'fault',
-                                       'strength')}
+_OWN = {
+    name: (name, 1.0) for name in ('cv', 'x1', 'p1', 'p2', 't1', 'flow', 'ps', 'fault', 'strength')
+}
 _SCALED = {  # outputs of the benchmark's library, shares of their ranges
-    'CV': ('cv', 1.0), 'X': ('x1', 1.0), 'X_norm': ('x1', 1.0), 'P1_norm': ('p1', 4e6),
-    'P2_norm': ('p2', 4e6), 'T1_norm': ('t1', 200.0), 'F_norm': ('flow', 40 * TPH),
+    'CV': ('cv', 1.0),
+    'X': ('x1', 1.0),
+    'X_norm': ('x1', 1.0),
+    'P1_norm': ('p1', 4e6),
+    'P2_norm': ('p2', 4e6),
+    'T1_norm': ('t1', 200.0),
+    'F_norm': ('flow', 40 * TPH),
 }
 _TAGS = {  # of the three actuators of the sugar factory
-    1: {'P51_05': ('p1', KPA), 'P51_06': ('p2', KPA), 'T51_01': ('t1', 1.0),
-        'F51_01': ('flow', M3H), 'LC51_03CV': ('cv', PERCENT), 'LC51_03X': ('x1', PERCENT)},
-    2: {'P57_03': ('p1', KPA), 'P57_04': ('p2', KPA), 'T57_03': ('t1', 1.0),
-        'FC57_03PV': ('flow', M3H), 'FC57_03CV': ('cv', PERCENT), 'FC57_03X': ('x1', PERCENT)},
-    3: {'P74_00': ('p1', KPA), 'P74_01': ('p2', KPA), 'T74_00': ('t1', 1.0),
-        'F74_00': ('flow', TPH), 'LC74_20CV': ('cv', PERCENT), 'LC74_20X': ('x1', PERCENT),
-        'L74_20X': ('x1', PERCENT)},  # as some sheets write it
+    1: {
+        'P51_05': ('p1', KPA),
+        'P51_06': ('p2', KPA),
+        'T51_01': ('t1', 1.0),
+        'F51_01': ('flow', M3H),
+        'LC51_03CV': ('cv', PERCENT),
+        'LC51_03X': ('x1', PERCENT),
+    },
+    2: {
+        'P57_03': ('p1', KPA),
+        'P57_04': ('p2', KPA),
+        'T57_03': ('t1', 1.0),
+        'FC57_03PV': ('flow', M3H),
+        'FC57_03CV': ('cv', PERCENT),
+        'FC57_03X': ('x1', PERCENT),
+    },
+    3: {
+        'P74_00': ('p1', KPA),
+        'P74_01': ('p2', KPA),
+        'T74_00': ('t1', 1.0),
+        'F74_00': ('flow', TPH),
+        'LC74_20CV': ('cv', PERCENT),
+        'LC74_20X': ('x1', PERCENT),
+        'L74_20X': ('x1', PERCENT),
+    },  # as some sheets write it
 }
-LUBLIN = tuple((  # noqa: SIM905
-    't P51_05 P51_06 T51_01 F51_01 LC51_03CV LC51_03X LC51_03PV TC51_05 T51_08 D51_01 D51_02'
-    ' F51_02 PC51_01 T51_06 P51_03 T51_07 P57_03 P57_04 T57_03 FC57_03PV FC57_03CV FC57_03X'
-    ' P74_00 P74_01 T74_00 F74_00 LC74_20CV LC74_20X LC74_20PV F74_30 P74_30 T74_30'
-).split())
+LUBLIN = tuple(
+    (  # noqa: SIM905
+        't P51_05 P51_06 T51_01 F51_01 LC51_03CV LC51_03X LC51_03PV TC51_05 T51_08 D51_01 D51_02'
+        ' F51_02 PC51_01 T51_06 P51_03 T51_07 P57_03 P57_04 T57_03 FC57_03PV FC57_03CV FC57_03X'
+        ' P74_00 P74_01 T74_00 F74_00 LC74_20CV LC74_20X LC74_20PV F74_30 P74_30 T74_30'
+    ).split()
+)
 NOT_MEASURED = ('', '-', 'na', 'n/a', '#n/a', 'nan', 'null', 'none')  # in a cell
 Use = tuple[int, float]  # column of the file, factor to SI
 
@@ -84,8 +110,10 @@ class Table:
                 row += len(lines)
                 timed = np.isfinite(block[:, place[self.columns['stamp'][0]]])
                 if not timed.all():
-                    on_problem(f'{self.path}: {(~timed).sum()} rows up to line {row} have no time'
-                               ' and are left out')
+                    on_problem(
+                        f'{self.path}: {(~timed).sum()} rows up to line {row} have no time'
+                        ' and are left out'
+                    )
                 if timed.any():
                     yield self._named(block[timed], place)
 
@@ -104,13 +132,17 @@ class Table:
         if len(bad) > len(rows):
             raise BagError(f'{bad[0]} is no row of numbers; time has to be in seconds', self.path)
         if bad:
-            on_problem(f'{self.path}: {len(bad)} lines are no rows of numbers and are left out,'
-                       f' first {bad[0]}')
+            on_problem(
+                f'{self.path}: {len(bad)} lines are no rows of numbers and are left out,'
+                f' first {bad[0]}'
+            )
         return np.array(rows, float).reshape(len(rows), len(use))
 
     def _named(self, block: NDArray, place: Mapping[int, int]) -> dict[str, NDArray]:
-        columns = {name: block[:, place[column]] * factor
-                   for name, (column, factor) in self.columns.items()}
+        columns = {
+            name: block[:, place[column]] * factor
+            for name, (column, factor) in self.columns.items()
+        }
         stamp = np.round(columns['stamp']).astype(np.int64) + self.start
         return columns | {'stamp': stamp}
 
@@ -127,7 +159,9 @@ def parse_cell(text: str) -> float:
 
 
 def read_table(
-    path: str | Path, actuator: int | None = None, chosen: Mapping[str, tuple[str, float]] = {},  # noqa: B006
+    path: str | Path,
+    actuator: int | None = None,
+    chosen: Mapping[str, tuple[str, float]] = {},
 ) -> list[Table]:
     """
     Find the actuators in a text file.
@@ -153,7 +187,8 @@ def read_table(
         if len(names) != len(LUBLIN):
             raise NoMeasurementError(
                 f'has no header line and {len(names)} columns; name the columns in a first line,'
-                f' or give a daily file of {len(LUBLIN)} columns', path,
+                f' or give a daily file of {len(LUBLIN)} columns',
+                path,
             )
         names, header, start = list(LUBLIN), 0, _midnight(path)
     tables = [
@@ -164,7 +199,8 @@ def read_table(
     if not tables:
         raise NoMeasurementError(
             f'lacks a time, a control value or a position; it has the columns {", ".join(names)};'
-            ' name them: --map t=TIME --map cv=COLUMN --map x1=COLUMN*0.01', path,
+            ' name them: --map t=TIME --map cv=COLUMN --map x1=COLUMN*0.01',
+            path,
         )
     return tables
 
@@ -182,8 +218,9 @@ def _actuators(
             own[target] = i, factor
     for target, (name, factor) in chosen.items():
         if name not in names:
-            raise BagError(f'--map {target}={name}: there is no such column; there are '
-                           + ', '.join(names))
+            raise BagError(
+                f'--map {target}={name}: there is no such column; there are ' + ', '.join(names)
+            )
         stamp = target in ('t', 'stamp')
         own['stamp' if stamp else target] = names.index(name), factor * (SECOND if stamp else 1.0)
     if {'cv', 'x1'} <= own.keys():

@@ -88,9 +88,16 @@ class BagWriter:
     """
 
     def __init__(
-        self, path: str | Path, *, split_bytes: int = 0, split_seconds: float = 0.0,
-        quota_bytes: int = 0, chunk_size: int = CHUNK_SIZE, flush_period: float = FLUSH_PERIOD,
-        level: int = LEVEL, message_index: bool = True,
+        self,
+        path: str | Path,
+        *,
+        split_bytes: int = 0,
+        split_seconds: float = 0.0,
+        quota_bytes: int = 0,
+        chunk_size: int = CHUNK_SIZE,
+        flush_period: float = FLUSH_PERIOD,
+        level: int = LEVEL,
+        message_index: bool = True,
         custom_data: Mapping[str, str] | None = None,
     ):
         self.path = Path(path)
@@ -137,7 +144,11 @@ class BagWriter:
         self._files.append(self._file)
 
     def add_topic(
-        self, name: str, kind: str, offered_qos: Sequence[QosProfile] = (), hash_: str = '',
+        self,
+        name: str,
+        kind: str,
+        offered_qos: Sequence[QosProfile] = (),
+        hash_: str = '',
     ) -> Topic:
         """
         Declare a topic; a second declaration returns the first.
@@ -196,7 +207,9 @@ class BagWriter:
         self._mcap.add_message(channel, data, log_time, publish_time)
 
     def write_columns(
-        self, stamp: NDArray[np.int64], messages: Mapping[str, Mapping[str, NDArray]],
+        self,
+        stamp: NDArray[np.int64],
+        messages: Mapping[str, Mapping[str, NDArray]],
         frame_id: str,
     ) -> None:
         """
@@ -295,7 +308,9 @@ class BagWriter:
 
 
 def write_columns(
-    path: str | Path, columns: Mapping[str, NDArray], frame_id: str = 'LC74_20',
+    path: str | Path,
+    columns: Mapping[str, NDArray],
+    frame_id: str = 'LC74_20',
 ) -> None:
     """
     Write simulated or converted columns as the recorder would have written them.

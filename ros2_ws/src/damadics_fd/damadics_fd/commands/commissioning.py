@@ -88,8 +88,9 @@ class Proposal:
     remarks: list[str] = field(default_factory=list)
 
 
-def propose(columns: Mapping[str, NDArray[Any]], data_sheet: Settings,
-            days: float = 30.0) -> Proposal:
+def propose(
+    columns: Mapping[str, NDArray[Any]], data_sheet: Settings, days: float = 30.0
+) -> Proposal:
     """
     Propose settings from a fault-free recording in which the valve moves both ways.
 
@@ -116,9 +117,11 @@ def propose(columns: Mapping[str, NDArray[Any]], data_sheet: Settings,
         remarks.append('too little was monitored to propose a limit: record longer')
     elif limit.ratio > 1.0:
         step = limit.ratio / settings.level_maintenance
-        settings = settings.replace(level_maintenance=limit.ratio,
-                                    level_specification=settings.level_specification * step,
-                                    level_failure=settings.level_failure * step)
+        settings = settings.replace(
+            level_maintenance=limit.ratio,
+            level_specification=settings.level_specification * step,
+            level_failure=settings.level_failure * step,
+        )
     settings = settings.replace(signature=data_sheet.signature, own_alarm=data_sheet.own_alarm)
     return Proposal(settings, balance, limit, result, noise, remarks)
 
@@ -139,12 +142,14 @@ def check_units(columns: Mapping[str, NDArray[Any]]) -> None:
             continue
         top = float(np.percentile(np.abs(values), 99.0))
         if name in ('cv', 'x1') and top > 1.5:
-            wrong.append(f'{name} reaches {top:.3g}: percent? give a fraction: --map {name}='
-                         'SOURCE*0.01')
+            wrong.append(
+                f'{name} reaches {top:.3g}: percent? give a fraction: --map {name}=SOURCE*0.01'
+            )
         if name in ('p1', 'p2', 'ps') and top < 2e3:
             unit = 'MPa' if top < 5.0 and name != 'ps' else 'bar or kPa'
-            wrong.append(f'{name} reaches only {top:.3g}: {unit}? give Pa: --map {name}='
-                         'SOURCE*FACTOR')
+            wrong.append(
+                f'{name} reaches only {top:.3g}: {unit}? give Pa: --map {name}=SOURCE*FACTOR'
+            )
     if wrong:
         raise CommissioningError('; '.join(wrong))
 
@@ -159,16 +164,24 @@ def check_directions(columns: Mapping[str, NDArray[Any]]) -> None:
     good = np.all([np.isfinite(columns[name]) for name in ('cv', 'x1', 'ps')], axis=0)
     cv, x1, ps = (np.asarray(columns[name], float)[good] for name in ('cv', 'x1', 'ps'))
     if len(x1) < 10 or np.ptp(x1) < 0.2:
-        raise CommissioningError(f'the stem moves only {np.ptp(x1) if len(x1) else 0.0:.2f} of '
-                                 'its stroke: move the valve through 0.2 or more, both ways')
-    lead = {name: float(np.corrcoef(signal, x1)[0, 1]) for name, signal in
-            (('cv', cv), ('ps', ps)) if np.ptp(signal) > 0.0}
+        raise CommissioningError(
+            f'the stem moves only {np.ptp(x1) if len(x1) else 0.0:.2f} of '
+            'its stroke: move the valve through 0.2 or more, both ways'
+        )
+    lead = {
+        name: float(np.corrcoef(signal, x1)[0, 1])
+        for name, signal in (('cv', cv), ('ps', ps))
+        if np.ptp(signal) > 0.0
+    }
     if lead.get('cv', 1.0) < 0.0:
-        raise CommissioningError('x1 falls when cv rises: one of them is inverted; 1 must mean '
-                                 'closed in both')
+        raise CommissioningError(
+            'x1 falls when cv rises: one of them is inverted; 1 must mean closed in both'
+        )
     if lead.get('ps', 1.0) < 0.0:
-        raise CommissioningError('x1 falls when ps rises: this is a pressure-to-open valve or x1 '
-                                 'is inverted; 1 must mean closed, and pressure must close')
+        raise CommissioningError(
+            'x1 falls when ps rises: this is a pressure-to-open valve or x1 '
+            'is inverted; 1 must mean closed, and pressure must close'
+        )
 
 
 def sample_rate(stamps: NDArray[np.int64]) -> float:
@@ -200,16 +213,24 @@ def fit_balance(result: Result, columns: Mapping[str, NDArray[Any]], base: Setti
     smooth = e['x1_hat'] + e['xi1'] - base.preload
     inside = result.accepted & (smooth > base.gate_low) & (smooth < 1.0 - base.gate_high)
     width = max(1, round(STEADY * base.sample_rate))
-    x, v, force = (_means(signal, width) for signal in (
-        np.asarray(columns['x1'], float), e['x2'],
-        e['u'] * base.stiffness * base.stroke))
-    steady = [np.convolve(way & (_means(inside, width) == 1.0), np.ones(3), 'same') > 2.5
-              for way in (v > SLOWEST, v < -SLOWEST)]  # and so before and after
+    x, v, force = (
+        _means(signal, width)
+        for signal in (
+            np.asarray(columns['x1'], float),
+            e['x2'],
+            e['u'] * base.stiffness * base.stroke,
+        )
+    )
+    steady = [
+        np.convolve(way & (_means(inside, width) == 1.0), np.ones(3), 'same') > 2.5
+        for way in (v > SLOWEST, v < -SLOWEST)
+    ]  # and so before and after
     up, down = (int(np.sum(way)) for way in steady)
     if min(up, down) < LEAST_BLOCKS:
         raise CommissioningError(
             f'{up * STEADY:.1f} s of steady closing and {down * STEADY:.1f} s of opening in '
-            f'mid-stroke, {LEAST_BLOCKS * STEADY:g} s of each are needed: move it both ways')
+            f'mid-stroke, {LEAST_BLOCKS * STEADY:g} s of each are needed: move it both ways'
+        )
     use = steady[0] | steady[1]
     x, v, force = x[use], v[use], force[use]
     A = np.column_stack([base.stroke * x, np.ones(len(x)), base.stroke * v, np.sign(v)])
@@ -219,28 +240,40 @@ def fit_balance(result: Result, columns: Mapping[str, NDArray[Any]], base: Setti
     # data sheet's viscous friction, known to VISCOUS_STD
     sheet = max(base.alpha1 * base.mass, 1.0)
     H, g = A.T @ A / misfit**2, A.T @ force / misfit**2
-    H[2, 2] += 1.0 / (VISCOUS_STD * sheet)**2
-    g[2] += sheet / (VISCOUS_STD * sheet)**2
+    H[2, 2] += 1.0 / (VISCOUS_STD * sheet) ** 2
+    g[2] += sheet / (VISCOUS_STD * sheet) ** 2
     spread = np.linalg.inv(H)
     theta = spread @ g
     fitted = A @ theta
     K, offset, viscous, friction = (float(value) for value in theta)
     if K <= 0.0 or offset < -0.5 * K * base.stroke:
-        raise CommissioningError(f'the force does not rise with the position (K = {K:.3g} N/m): '
-                                 'check area, plug_diameter and the units of the pressures')
-    return Balance(K, max(0.0, offset / (K * base.stroke)), max(0.0, viscous), abs(friction),
-                   math.sqrt(spread[0, 0]), misfit, x, force, fitted)
+        raise CommissioningError(
+            f'the force does not rise with the position (K = {K:.3g} N/m): '
+            'check area, plug_diameter and the units of the pressures'
+        )
+    return Balance(
+        K,
+        max(0.0, offset / (K * base.stroke)),
+        max(0.0, viscous),
+        abs(friction),
+        math.sqrt(spread[0, 0]),
+        misfit,
+        x,
+        force,
+        fitted,
+    )
 
 
 def _means(signal: NDArray[Any], width: int) -> NDArray[np.float64]:
     """Return the means of blocks of a signal, NaN where a sample is missing."""
     n = len(signal) // width
-    means: NDArray[np.float64] = signal[:n * width].reshape(n, width).mean(axis=1)
+    means: NDArray[np.float64] = signal[: n * width].reshape(n, width).mean(axis=1)
     return means
 
 
-def tune(columns: Mapping[str, NDArray[Any]], base: Settings,
-         balance: Balance) -> tuple[Settings, float, list[str]]:
+def tune(
+    columns: Mapping[str, NDArray[Any]], base: Settings, balance: Balance
+) -> tuple[Settings, float, list[str]]:
     """
     Set the constants by the rules for another actuator.
 
@@ -259,10 +292,17 @@ def tune(columns: Mapping[str, NDArray[Any]], base: Settings,
     phi = 1.4 * balance.friction / (base.mass * base.stroke)
     delta = _digits(max(0.075 * phi / pole, 1e-4))
     scaled = base.replace(
-        stiffness=_digits(balance.stiffness, 5), preload=_digits(balance.preload),
-        alpha1=_digits(alpha1), alpha4=_digits(alpha5, 5), alpha5=_digits(alpha5, 5), delta=delta,
-        dz=2.0 * delta, rho_min=_digits(6.6 * delta), g5=_digits(0.87 * pole),
-        gw=_digits(33.0 * pole / (1.93 * (base.t_learn - base.t_w))))
+        stiffness=_digits(balance.stiffness, 5),
+        preload=_digits(balance.preload),
+        alpha1=_digits(alpha1),
+        alpha4=_digits(alpha5, 5),
+        alpha5=_digits(alpha5, 5),
+        delta=delta,
+        dz=2.0 * delta,
+        rho_min=_digits(6.6 * delta),
+        g5=_digits(0.87 * pole),
+        gw=_digits(33.0 * pole / (1.93 * (base.t_learn - base.t_w))),
+    )
     for wn in BANDWIDTHS:
         scaled = scaled.replace(wn=wn)
         state = run(columns, scaled).estimator.state[0]
@@ -270,9 +310,11 @@ def tune(columns: Mapping[str, NDArray[Any]], base: Settings,
         if 4.0 * noise <= scaled.dz:
             break
     if 4.0 * noise > scaled.dz:
-        remarks.append(f'sensor noise is {noise:.2g} 1/s in the residual: the dead-zone is '
-                       'widened, small faults take longer to show; damp the pressure '
-                       'transmitters or calibrate their span to what is needed')
+        remarks.append(
+            f'sensor noise is {noise:.2g} 1/s in the residual: the dead-zone is '
+            'widened, small faults take longer to show; damp the pressure '
+            'transmitters or calibrate their span to what is needed'
+        )
         dz = _digits(4.0 * noise)
         scaled = scaled.replace(dz=dz, rho_min=_digits(3.3 * dz))
     share = 4.0 * balance.stiffness_std / balance.stiffness
@@ -292,8 +334,11 @@ def watched(result: Result, settings: Settings) -> NDArray[np.bool_]:
     e = result.estimates
     x = e['x1_hat'] + e['xi1'] - settings.preload
     mask: NDArray[np.bool_] = (
-        result.accepted & (e['phase'] == PHASE_MONITOR) & (x > settings.gate_low)
-        & (x < 1.0 - settings.gate_high))
+        result.accepted
+        & (e['phase'] == PHASE_MONITOR)
+        & (x > settings.gate_low)
+        & (x < 1.0 - settings.gate_high)
+    )
     return mask
 
 
@@ -313,11 +358,11 @@ def set_limit(result: Result, settings: Settings, days: float) -> Limit | None:
     counts = watched(result, settings)
     ratio = np.where(counts, result.decisions['ratio'], 0.0)
     need = settings.decide_m
-    lasting = np.min([ratio[i:len(ratio) - need + 1 + i] for i in range(need)], axis=0)
+    lasting = np.min([ratio[i : len(ratio) - need + 1 + i] for i in range(need)], axis=0)
     window = max(need, round(BLOCK * settings.sample_rate))
     n = len(lasting) // window
-    blocks = lasting[:n * window].reshape(n, window)
-    full = counts[:n * window].reshape(n, window).mean(axis=1) > 0.5
+    blocks = lasting[: n * window].reshape(n, window)
+    full = counts[: n * window].reshape(n, window).mean(axis=1) > 0.5
     maxima = blocks[full].max(axis=1) if n else np.zeros(0)
     if len(maxima) < LEAST_BLOCKS:
         return None
@@ -326,9 +371,18 @@ def set_limit(result: Result, settings: Settings, days: float) -> Limit | None:
     draws = [_gumbel(rng.choice(maxima, len(maxima))) for _ in range(200)]
     wanted = days * DAY / BLOCK
     low, high = np.percentile([_level(a, b, wanted) for a, b in draws], [5.0, 95.0])
-    return Limit(_digits(_level(location, scale, wanted)), float(low), float(high), days,
-                 len(maxima) * BLOCK / 3600.0, len(maxima), float(maxima.max()), maxima, location,
-                 scale)
+    return Limit(
+        _digits(_level(location, scale, wanted)),
+        float(low),
+        float(high),
+        days,
+        len(maxima) * BLOCK / 3600.0,
+        len(maxima),
+        float(maxima.max()),
+        maxima,
+        location,
+        scale,
+    )
 
 
 def _gumbel(maxima: NDArray[np.float64]) -> tuple[float, float]:

@@ -34,4 +34,4 @@ def main() -> int:
         )
         return 2
     print('evaluate: this is ros2 run damadics_evaluate evaluate now.', file=sys.stderr)
-    os.execv(program, [*COMMAND, *sys.argv[1:]])
+    return os.execv(program, [*COMMAND, *sys.argv[1:]])

@@ -27,23 +27,31 @@ LAST_WAIT = 0.12  # [s] at most, from the signal to the closing of the bag
 
 def _arguments(args: list[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
-        prog='recorder', description='Record topics into an MCAP bag until SIGINT or SIGTERM.',
+        prog='recorder',
+        description='Record topics into an MCAP bag until SIGINT or SIGTERM.',
         epilog='example: ros2 run damadics_fd recorder measurement fault_flag --out bags/monday',
     )
     parser.add_argument('topics', nargs='*', help='topics to record; none means all')
     parser.add_argument('--all', action='store_true', help='record all topics')
     parser.add_argument(
-        '--out', type=Path, help='bag directory to create, or a single .mcap file'
+        '--out',
+        type=Path,
+        help='bag directory to create, or a single .mcap file'
         ' (default: rosbag2_ and the time of day)',
     )
     parser.add_argument('--split-mb', type=float, default=0, help='new file every so many MB')
     parser.add_argument('--split-s', type=float, default=0, help='new file every so many seconds')
     parser.add_argument(
-        '--quota-mb', type=float, default=0,
+        '--quota-mb',
+        type=float,
+        default=0,
         help='keep the bag below so many MB by removing its oldest files',
     )
     parser.add_argument(
-        '--black-box', nargs=2, type=float, metavar=('BEFORE', 'AFTER'),
+        '--black-box',
+        nargs=2,
+        type=float,
+        metavar=('BEFORE', 'AFTER'),
         help='hold the last BEFORE seconds in memory; write a bag when a fault is flagged, until'
         ' AFTER seconds later',
     )
@@ -81,8 +89,12 @@ def main(args: list[str] | None = None) -> int:
     finally:
         rclpy.try_shutdown()
     lost = ''.join(
-        f', {count} {what}' for count, what in
-        ((sum(node.lost.values()), 'lost on the way'), (spool.dropped, 'dropped')) if count
+        f', {count} {what}'
+        for count, what in (
+            (sum(node.lost.values()), 'lost on the way'),
+            (spool.dropped, 'dropped'),
+        )
+        if count
     )
     print(f'recorded {sum(bag.counts.values())} messages{lost}, {bag.size} bytes: {bag.path}')
     return int(bool(spool.dropped))
@@ -92,7 +104,9 @@ def _bag(options: argparse.Namespace) -> BagWriter | BlackBox:
     if options.black_box:
         return BlackBox(options.out, *options.black_box)
     return BagWriter(
-        options.out, split_bytes=int(options.split_mb * 1e6), split_seconds=options.split_s,
+        options.out,
+        split_bytes=int(options.split_mb * 1e6),
+        split_seconds=options.split_s,
         quota_bytes=int(options.quota_mb * 1e6),
     )
 

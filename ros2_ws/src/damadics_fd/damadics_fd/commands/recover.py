@@ -19,11 +19,17 @@ example:
 
 def main(args: list[str] | None = None) -> int:
     """Run the command."""
-    parser = command_parser('recover', 'Copy every intact message of a damaged bag to a new one.',
-                            EXAMPLE)
+    parser = command_parser(
+        'recover', 'Copy every intact message of a damaged bag to a new one.', EXAMPLE
+    )
     parser.add_argument('bag', type=Path, metavar='BAG', help='MCAP file or bag directory')
-    parser.add_argument('--out', type=Path, required=True, metavar='BAG',
-                        help='file to write, a directory where BAG is one')
+    parser.add_argument(
+        '--out',
+        type=Path,
+        required=True,
+        metavar='BAG',
+        help='file to write, a directory where BAG is one',
+    )
     options = parser.parse_args(args)
     try:
         report = salvage(options.bag, options.out)

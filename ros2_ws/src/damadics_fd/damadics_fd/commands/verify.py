@@ -18,16 +18,19 @@ example:
 
 def print_report(report: Report) -> None:
     """Print what a bag holds and its verdict; problems go to stderr."""
-    print(f'{report.path}: {report.files} file(s), {report.size} bytes,'
-          f' {report.messages} messages')
+    print(
+        f'{report.path}: {report.files} file(s), {report.size} bytes, {report.messages} messages'
+    )
     rows = [
         (topic.name, topic.type, str(topic.count), f'{(topic.end - topic.start) / 1e9:.3f} s')
         for topic in report.topics.values()
     ]
     widths = [max((len(row[i]) for row in rows), default=0) for i in range(4)]
     for name, kind, count, duration in rows:
-        print(f'  {name:{widths[0]}}  {kind:{widths[1]}}  {count:>{widths[2]}}'
-              f'  {duration:>{widths[3]}}')
+        print(
+            f'  {name:{widths[0]}}  {kind:{widths[1]}}  {count:>{widths[2]}}'
+            f'  {duration:>{widths[3]}}'
+        )
     for remark in report.remarks:
         print(f'  remark: {remark}')
     for problem in report.problems[:SHOWN]:
@@ -40,8 +43,9 @@ def print_report(report: Report) -> None:
 def main(args: list[str] | None = None) -> int:
     """Run the command."""
     parser = command_parser('verify', 'Tell what bags hold and whether they are whole.', EXAMPLE)
-    parser.add_argument('bags', nargs='+', type=Path, metavar='BAG',
-                        help='MCAP file or bag directory')
+    parser.add_argument(
+        'bags', nargs='+', type=Path, metavar='BAG', help='MCAP file or bag directory'
+    )
     options = parser.parse_args(args)
     codes = set()
     for path in options.bags:

@@ -18,8 +18,13 @@ def number(unit: str, text: str, low: float, high: float, paper: Any, monitor: A
     :param monitor: default in mode monitor.
     :return: the field.
     """
-    meta = {'unit': unit, 'description': text, 'low': low, 'high': high,
-            'default': {'paper': paper, 'monitor': monitor}}
+    meta = {
+        'unit': unit,
+        'description': text,
+        'low': low,
+        'high': high,
+        'default': {'paper': paper, 'monitor': monitor},
+    }
     return field(default=monitor, metadata=meta)
 
 
@@ -33,8 +38,12 @@ def choice(text: str, options: tuple[str, ...], paper: str, monitor: str) -> Any
     :param monitor: default in mode monitor.
     :return: the field.
     """
-    meta = {'unit': '', 'description': text, 'choices': options,
-            'default': {'paper': paper, 'monitor': monitor}}
+    meta = {
+        'unit': '',
+        'description': text,
+        'choices': options,
+        'default': {'paper': paper, 'monitor': monitor},
+    }
     return field(default=monitor, metadata=meta)
 
 

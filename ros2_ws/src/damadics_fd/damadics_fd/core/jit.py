@@ -42,8 +42,14 @@ def jit(function: F, inline: str = 'never') -> F:
     before = settings.CACHE_DIR
     settings.CACHE_DIR = before or _cache(Path(function.__code__.co_filename).parent)
     try:
-        compiled = njit(cache=True, nogil=True, fastmath=False, error_model='numpy',
-                        inline=inline, no_cfunc_wrapper=True)  # no C callbacks: compiles faster
+        compiled = njit(
+            cache=True,
+            nogil=True,
+            fastmath=False,
+            error_model='numpy',
+            inline=inline,
+            no_cfunc_wrapper=True,
+        )  # no C callbacks: compiles faster
         return cast(F, compiled(function))
     finally:
         settings.CACHE_DIR = before

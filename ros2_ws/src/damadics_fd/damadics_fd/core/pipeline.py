@@ -79,9 +79,21 @@ class Result:
 
 
 @jit
-def estimate(q: NDArray, s: NDArray, c: NDArray, reason: NDArray, estimates: NDArray,
-             stamp: NDArray, cv: NDArray, x1: NDArray, p1: NDArray, p2: NDArray, t1: NDArray,
-             flow: NDArray, ps: NDArray) -> None:
+def estimate(
+    q: NDArray,
+    s: NDArray,
+    c: NDArray,
+    reason: NDArray,
+    estimates: NDArray,
+    stamp: NDArray,
+    cv: NDArray,
+    x1: NDArray,
+    p1: NDArray,
+    p2: NDArray,
+    t1: NDArray,
+    flow: NDArray,
+    ps: NDArray,
+) -> None:
     """
     Run `estimation.step` over columns.
 
@@ -100,12 +112,28 @@ def estimate(q: NDArray, s: NDArray, c: NDArray, reason: NDArray, estimates: NDA
     :param ps: chamber pressures.
     """
     for i in range(len(stamp)):
-        reason[i] = estimation.step(q[0], s[0], c[0], estimates[i], stamp[i], cv[i], x1[i], p1[i],
-                                    p2[i], t1[i], flow[i], ps[i])
+        reason[i] = estimation.step(
+            q[0],
+            s[0],
+            c[0],
+            estimates[i],
+            stamp[i],
+            cv[i],
+            x1[i],
+            p1[i],
+            p2[i],
+            t1[i],
+            flow[i],
+            ps[i],
+        )
 
 
-def run(columns: Mapping[str, NDArray[Any]], settings: Settings,
-        estimator: Estimator | None = None, detector: Detector | None = None) -> Result:
+def run(
+    columns: Mapping[str, NDArray[Any]],
+    settings: Settings,
+    estimator: Estimator | None = None,
+    detector: Detector | None = None,
+) -> Result:
     """
     Run a recording through estimator and detector, bit for bit as sample by sample.
 
@@ -127,15 +155,26 @@ def run(columns: Mapping[str, NDArray[Any]], settings: Settings,
     if isinstance(estimator, ScadaEstimator):
         _run_scada(estimator, detector, stamp, signals, reason, estimates, decisions)
     else:
-        estimate(estimator.quality, estimator.state, _record(settings), reason, estimates, stamp,
-                 *signals)
+        estimate(
+            estimator.quality,
+            estimator.state,
+            _record(settings),
+            reason,
+            estimates,
+            stamp,
+            *signals,
+        )
         detector.judge(reason, estimates, decisions)
     _blank(reason, stamp, estimates, decisions)
     return Result(reason, estimates, decisions, estimator, detector)
 
 
-def watch(columns: Mapping[str, NDArray[Any]], settings: Settings, estimator: Estimator,
-          detector: Detector) -> list[Event]:
+def watch(
+    columns: Mapping[str, NDArray[Any]],
+    settings: Settings,
+    estimator: Estimator,
+    detector: Detector,
+) -> list[Event]:
     """
     Run a recording like `run`, but keep nothing of it but the transitions of the alarm.
 
@@ -156,8 +195,15 @@ def watch(columns: Mapping[str, NDArray[Any]], settings: Settings, estimator: Es
     for first in range(0, len(stamp), PIECE):
         piece = slice(first, first + PIECE)
         n = len(stamp[piece])
-        estimate(estimator.quality, estimator.state, record, reason, estimates, stamp[piece],
-                 *(signal[piece] for signal in signals))
+        estimate(
+            estimator.quality,
+            estimator.state,
+            record,
+            reason,
+            estimates,
+            stamp[piece],
+            *(signal[piece] for signal in signals),
+        )
         done = 0
         while done < n:
             done, kept = detector.judge(reason[:n], estimates[:n], decisions, False, done)
@@ -185,16 +231,21 @@ def _contiguous(
         raise KeyError(f'the recording has no column {", ".join(missing)}')
     stamp = np.ascontiguousarray(columns['stamp'], np.int64)
     unmeasured = np.broadcast_to(np.array(np.nan), stamp.shape)
-    signals = [np.ascontiguousarray(columns.get(name, unmeasured), np.float64)
-               for name in SIGNALS]
+    signals = [np.ascontiguousarray(columns.get(name, unmeasured), np.float64) for name in SIGNALS]
     if any(signal.shape != stamp.shape for signal in signals):
         raise ValueError('the columns of the recording differ in length')
     return stamp, signals
 
 
-def _run_scada(estimator: ScadaEstimator, detector: Detector, stamp: NDArray[np.int64],
-               signals: list[NDArray[np.float64]], reason: NDArray[np.uint8],
-               estimates: NDArray[Any], decisions: NDArray[Any]) -> None:
+def _run_scada(
+    estimator: ScadaEstimator,
+    detector: Detector,
+    stamp: NDArray[np.int64],
+    signals: list[NDArray[np.float64]],
+    reason: NDArray[np.uint8],
+    estimates: NDArray[Any],
+    decisions: NDArray[Any],
+) -> None:
     rows = zip(stamp.tolist(), *(signal.tolist() for signal in signals), strict=True)
     for i, row in enumerate(rows):
         estimate = estimator.update(*row)
@@ -203,11 +254,15 @@ def _run_scada(estimator: ScadaEstimator, detector: Detector, stamp: NDArray[np.
             reason[i] = REASONS.index(estimator.last_rejection.split(':')[0])
             continue
         estimates[i] = tuple(estimate)
-        decisions[i] = tuple(detector.update(estimate))[:len(DECISION.names or ())]
+        decisions[i] = tuple(detector.update(estimate))[: len(DECISION.names or ())]
 
 
-def _blank(reason: NDArray[np.uint8], stamp: NDArray[np.int64], estimates: NDArray[Any],
-           decisions: NDArray[Any]) -> None:
+def _blank(
+    reason: NDArray[np.uint8],
+    stamp: NDArray[np.int64],
+    estimates: NDArray[Any],
+    decisions: NDArray[Any],
+) -> None:
     """Fill the rows of refused samples."""
     refused = np.flatnonzero(reason)
     if not len(refused):

@@ -29,15 +29,26 @@ REMEDIES = {
 }
 SIGNALS = ('cv', 'x1', 'p1', 'p2', 't1', 'flow', 'ps')
 
-DTYPE = np.dtype((np.record, np.dtype([
-    ('stamp', 'i8'),  # of the last accepted sample
-    ('started', '?'),
-    ('counts', 'i8', (len(REASONS),)),
-    ('gaps', 'i8'), ('missed', 'i8'),  # gaps that were bridged, samples missing in them
-    ('restarts', 'i8'), ('clock_jumps', 'i8'),
-    ('refused_in_a_row', 'i8'),
-    ('jump_stamp', 'i8'), ('jump_count', 'i8'),  # samples in order after a clock set back
-], align=True)))
+DTYPE = np.dtype(
+    (
+        np.record,
+        np.dtype(
+            [
+                ('stamp', 'i8'),  # of the last accepted sample
+                ('started', '?'),
+                ('counts', 'i8', (len(REASONS),)),
+                ('gaps', 'i8'),
+                ('missed', 'i8'),  # gaps that were bridged, samples missing in them
+                ('restarts', 'i8'),
+                ('clock_jumps', 'i8'),
+                ('refused_in_a_row', 'i8'),
+                ('jump_stamp', 'i8'),
+                ('jump_count', 'i8'),  # samples in order after a clock set back
+            ],
+            align=True,
+        ),
+    )
+)
 
 
 @jit
@@ -96,8 +107,9 @@ def judge_signal(c: NDArray, index: int, value: float) -> int:
 
 
 @jit
-def check_values(c: Any, cv: float, x1: float, p1: float, p2: float, t1: float, flow: float,
-                 ps: float) -> int:
+def check_values(
+    c: Any, cv: float, x1: float, p1: float, p2: float, t1: float, flow: float, ps: float
+) -> int:
     """
     Judge the signals of a sample.
 
@@ -111,9 +123,14 @@ def check_values(c: Any, cv: float, x1: float, p1: float, p2: float, t1: float, 
     :param ps: chamber pressure [Pa].
     :return: ACCEPTED or the reason of the first signal to be refused.
     """
-    if (c.signal_low <= cv <= c.signal_high and c.signal_low <= x1 <= c.signal_high
-            and -0.025 * c.p_max <= p1 <= c.p_max and -0.025 * c.p_max <= p2 <= c.p_max
-            and -0.025 * c.ps_max <= ps <= c.ps_max and math.isfinite(t1 + flow)):
+    if (
+        c.signal_low <= cv <= c.signal_high
+        and c.signal_low <= x1 <= c.signal_high
+        and -0.025 * c.p_max <= p1 <= c.p_max
+        and -0.025 * c.p_max <= p2 <= c.p_max
+        and -0.025 * c.ps_max <= ps <= c.ps_max
+        and math.isfinite(t1 + flow)
+    ):
         return ACCEPTED  # nearly always; what follows costs ten times as much
     for index, value in enumerate((cv, x1, p1, p2, t1, flow, ps)):
         reason = signal_fault(c, index, value)

@@ -31,8 +31,17 @@ class SettingsError(ValueError):
 
 # Mode scada: the tests bring their own limits, so the detector's threshold is 1; see core/scada.
 SCADA = {
-    'sample_rate': 1.0, 'rho_min': 1.0, 'decide_m': 1, 'decide_n': 1, 't_on': 300.0, 't_w': 60.0,
-    't_learn': 900.0, 'gate_low': 0.0, 'gate_high': 0.0, 'gap_reset': 30.0, 'hold': 120.0,
+    'sample_rate': 1.0,
+    'rho_min': 1.0,
+    'decide_m': 1,
+    'decide_n': 1,
+    't_on': 300.0,
+    't_w': 60.0,
+    't_learn': 900.0,
+    'gate_low': 0.0,
+    'gate_high': 0.0,
+    'gap_reset': 30.0,
+    'hold': 120.0,
 }
 
 
@@ -58,138 +67,221 @@ class Settings:
     damadics_fd.core.settings.SettingsError: k1 = -1.0 1/s is outside 0.001..1e+06; ...
     """
 
-    mode: str = choice('paper: the printed method; monitor: learn, freeze, detect; '
-                       "scada: a control room's signals at 1 Hz", MODES,
-                       'paper', 'monitor')
-    sample_rate: float = number('Hz', 'nominal sample rate of the measurement', 0.01, 1e5,
-                                400.0, 200.0)
+    mode: str = choice(
+        'paper: the printed method; monitor: learn, freeze, detect; '
+        "scada: a control room's signals at 1 Hz",
+        MODES,
+        'paper',
+        'monitor',
+    )
+    sample_rate: float = number(
+        'Hz', 'nominal sample rate of the measurement', 0.01, 1e5, 400.0, 200.0
+    )
 
     # velocity estimator
     velocity: str = choice('velocity estimator', VELOCITIES, 'high_pass', 'kalman')
-    tau: float = number('s', 'time constant of the high-pass velocity filter', 1e-4, 10.0,
-                        0.14, 0.02)
-    wn: float = number('rad/s', 'bandwidth of the steady-state Kalman filter', 0.1, 1e4,
-                       50.0, 50.0)
-    lipschitz: float = number('1/s2', 'bound on the acceleration / stroke for the super-twisting '
-                              'differentiator', 1e-3, 1e6, 20.0, 20.0)
-    consistent: bool = switch('filter position and input with the filter of the velocity', False,
-                              True)
+    tau: float = number(
+        's', 'time constant of the high-pass velocity filter', 1e-4, 10.0, 0.14, 0.02
+    )
+    wn: float = number(
+        'rad/s', 'bandwidth of the steady-state Kalman filter', 0.1, 1e4, 50.0, 50.0
+    )
+    lipschitz: float = number(
+        '1/s2',
+        'bound on the acceleration / stroke for the super-twisting differentiator',
+        1e-3,
+        1e6,
+        20.0,
+        20.0,
+    )
+    consistent: bool = switch(
+        'filter position and input with the filter of the velocity', False, True
+    )
 
     # observer and adaptive laws, equations (10)-(15)
     k1: float = number('1/s', 'observer gain on the position error', 1e-3, 1e6, 100.0, 100.0)
     k2: float = number('1/s', 'observer gain on the velocity error', 1e-3, 1e6, 400.0, 400.0)
-    coupling: float = number('', 'weight p of xi1 in the Lyapunov function; the term '
-                             'alpha5/p xi2 in (10) is left out where p is 0', 0.0, 1e9, 1.0, 0.0)
+    coupling: float = number(
+        '',
+        'weight p of xi1 in the Lyapunov function; the term '
+        'alpha5/p xi2 in (10) is left out where p is 0',
+        0.0,
+        1e9,
+        1.0,
+        0.0,
+    )
     alpha1: float = number('1/s', 'initial alpha1, viscous friction / mass', 0.0, 1e7, 0.0, 750.0)
     alpha4: float = number('1/s2', 'initial alpha4, input gain', 0.0, 1e9, 0.04, 30446.0)
     alpha5: float = number('1/s2', 'initial alpha5, stiffness / mass', 0.0, 1e9, 0.04, 30446.0)
     g1: float = number('', 'adaptation gain of alpha1', 0.0, 1e9, 0.0, 0.0)
     g4: float = number('', 'adaptation gain of alpha4', 0.0, 1e9, 0.0, 0.0)
     g5: float = number('', 'adaptation gain of alpha5', 0.0, 1e9, 0.0, 1000.0)
-    gw: float = number('', 'adaptation gain of the weights and bounds in Phi', 0.0, 1e9,
-                       100.0, 500.0)
-    delta: float = number('1/s', 'half width of the boundary layer of the robust term', 1e-9,
-                          1e3, 0.05, 0.03)
-    dz: float = number('1/s', 'dead-zone: Phi learns only where |xi2| is larger', 0.0, 1e3,
-                       0.0, 0.06)
-    band: float = number('', 'alphas stay within this share of their initial values', 0.0, 1.0,
-                         0.3, 0.3)
+    gw: float = number(
+        '', 'adaptation gain of the weights and bounds in Phi', 0.0, 1e9, 100.0, 500.0
+    )
+    delta: float = number(
+        '1/s', 'half width of the boundary layer of the robust term', 1e-9, 1e3, 0.05, 0.03
+    )
+    dz: float = number(
+        '1/s', 'dead-zone: Phi learns only where |xi2| is larger', 0.0, 1e3, 0.0, 0.06
+    )
+    band: float = number(
+        '', 'alphas stay within this share of their initial values', 0.0, 1.0, 0.3, 0.3
+    )
     w_max: float = number('', 'bound on the norm of the weights in Phi', 1e-9, 1e12, 1e5, 1e5)
 
     # threshold (16) and decision
-    threshold: str = choice('paper: rho = |Phi|/k2; floor: kappa |Phi|/(k2 + alpha1)',
-                            THRESHOLDS, 'paper', 'floor')
+    threshold: str = choice(
+        'paper: rho = |Phi|/k2; floor: kappa |Phi|/(k2 + alpha1)', THRESHOLDS, 'paper', 'floor'
+    )
     kappa: float = number('', 'factor of the threshold "floor"', 0.01, 1e3, 1.0, 1.5)
     rho_min: float = number('1/s', 'lowest threshold', 0.0, 1e3, 0.0, 0.2)
     decide_m: int = number('', 'samples over the threshold that make a decision ...', 1, 64, 2, 2)
     decide_n: int = number('', '... out of this number of latest samples', 1, 64, 2, 2)
-    on_delay: float = number('s', 'time a decision lasts before it raises the alarm', 0.0, 3600.0,
-                             0.0, 0.0)
-    off_delay: float = number('s', 'time without decision before the condition counts as gone',
-                              0.0, 86400.0, 0.0, 5.0)
+    on_delay: float = number(
+        's', 'time a decision lasts before it raises the alarm', 0.0, 3600.0, 0.0, 0.0
+    )
+    off_delay: float = number(
+        's', 'time without decision before the condition counts as gone', 0.0, 86400.0, 0.0, 5.0
+    )
     latch: bool = switch('keep the alarm until it is reset', False, True)
-    level_maintenance: float = number('', 'residual/threshold of "maintenance required"', 1.0,
-                                      1e6, 1.0, 1.0)
-    level_specification: float = number('', 'residual/threshold of "out of specification"', 1.0,
-                                        1e6, 1.5, 1.5)
+    level_maintenance: float = number(
+        '', 'residual/threshold of "maintenance required"', 1.0, 1e6, 1.0, 1.0
+    )
+    level_specification: float = number(
+        '', 'residual/threshold of "out of specification"', 1.0, 1e6, 1.5, 1.5
+    )
     level_failure: float = number('', 'residual/threshold of "failure"', 1.0, 1e6, 2.5, 2.5)
     chatter: int = number('1/min', 'alarms per minute that count as chatter', 2, 16, 3, 3)
 
     # learning
-    t_on: float = number('s', 'time for the filters to settle before learning', 0.0, 1e6,
-                         0.0, 5.0)
+    t_on: float = number('s', 'time for the filters to settle before learning', 0.0, 1e6, 0.0, 5.0)
     t_w: float = number('s', 'start of the learning of Phi', 0.0, 1e6, 0.0, 20.0)
     t_learn: float = number('s', 'earliest end of learning', 0.0, 1e7, 0.0, 60.0)
     travel_min: float = number('', 'stem travel / stroke that learning needs', 0.0, 1e6, 0.0, 0.5)
-    noise_factor: float = number('', 'standard deviations of the noise, where it is largest, that '
-                                 'Phi and threshold together keep off at least', 0.0, 100.0,
-                                 5.0, 5.0)
-    play: float = number('', 'motion within a play of this half width is no travel', 0.0, 0.5,
-                         0.005, 0.005)
-    settled_stiffness: float = number('', 'change of the stiffness while learning that is '
-                                      'tolerated', 1e-6, 1.0, 0.004, 0.004)
-    settled_friction: float = number('', 'change of the friction / (K L) while learning that is '
-                                     'tolerated', 1e-6, 1.0, 0.0018, 0.0018)
-    settled_max: float = number('', 'squared distance, in standard deviations, from the valve at '
-                                'the start of learning that makes it start again', 1.0, 1e12,
-                                60.0, 60.0)
-    gate_low: float = number('', 'stem closer to the open stop: a push from the stop is ignored',
-                             0.0, 0.5, 0.0, 0.01)
-    gate_high: float = number('', 'stem closer to the closed stop: nothing is decided or learned',
-                              0.0, 0.5, 0.0, 0.03)
+    noise_factor: float = number(
+        '',
+        'standard deviations of the noise, where it is largest, that '
+        'Phi and threshold together keep off at least',
+        0.0,
+        100.0,
+        5.0,
+        5.0,
+    )
+    play: float = number(
+        '', 'motion within a play of this half width is no travel', 0.0, 0.5, 0.005, 0.005
+    )
+    settled_stiffness: float = number(
+        '', 'change of the stiffness while learning that is tolerated', 1e-6, 1.0, 0.004, 0.004
+    )
+    settled_friction: float = number(
+        '',
+        'change of the friction / (K L) while learning that is tolerated',
+        1e-6,
+        1.0,
+        0.0018,
+        0.0018,
+    )
+    settled_max: float = number(
+        '',
+        'squared distance, in standard deviations, from the valve at '
+        'the start of learning that makes it start again',
+        1.0,
+        1e12,
+        60.0,
+        60.0,
+    )
+    gate_low: float = number(
+        '', 'stem closer to the open stop: a push from the stop is ignored', 0.0, 0.5, 0.0, 0.01
+    )
+    gate_high: float = number(
+        '', 'stem closer to the closed stop: nothing is decided or learned', 0.0, 0.5, 0.0, 0.03
+    )
 
     # the actuator, for the force input u = m g + Ae Ps - Fvc(X, P1, P2)
     mass: float = number('kg', 'moving mass', 1e-3, 1e5, 2.0, 2.0)
-    stiffness: float = number('N/m', 'spring and diaphragm constant K', 1.0, 1e9,
-                              60892.0, 60892.0)
+    stiffness: float = number('N/m', 'spring and diaphragm constant K', 1.0, 1e9, 60892.0, 60892.0)
     stroke: float = number('m', 'travel of the stem', 1e-4, 10.0, 0.0381, 0.0381)
-    preload: float = number('', 'initial compression of the spring / stroke', 0.0, 10.0,
-                            0.0, 0.25)
+    preload: float = number('', 'initial compression of the spring / stroke', 0.0, 10.0, 0.0, 0.25)
     area: float = number('m2', 'effective area of the diaphragm', 1e-6, 10.0, 0.029, 0.029)
     plug_diameter: float = number('m', 'plug diameter', 0.0, 2.0, 0.05, 0.05)
     gravity: float = number('m/s2', 'gravity along the stem', -10.0, 10.0, 9.81, 9.81)
-    plug_table: tuple[float, ...] = field(default=PLUG_TABLE, metadata={
-        'unit': '', 'description': 'K_m of the plug force at 0, 10, .., 90, 99, 100 % of stroke',
-        'low': 0.01, 'high': 10.0, 'default': {'paper': PLUG_TABLE, 'monitor': PLUG_TABLE}})
+    plug_table: tuple[float, ...] = field(
+        default=PLUG_TABLE,
+        metadata={
+            'unit': '',
+            'description': 'K_m of the plug force at 0, 10, .., 90, 99, 100 % of stroke',
+            'low': 0.01,
+            'high': 10.0,
+            'default': {'paper': PLUG_TABLE, 'monitor': PLUG_TABLE},
+        },
+    )
 
     # the valve signature
     signature: bool = switch('tell friction, spring and sensors apart; needs ps', False, True)
     own_alarm: bool = switch('alarm on changes that the approximator cannot see', False, True)
-    verify: float = number('s', 'time to check the force model after learning; half an hour on '
-                           'a real valve', 0.0, 1e6, 60.0, 60.0)
-    plug_gain_std: float = number('', 'how well the plug force is known: standard deviation of '
-                                  'its gain', 1e-9, 1.0, 0.03, 0.03)
+    verify: float = number(
+        's',
+        'time to check the force model after learning; half an hour on a real valve',
+        0.0,
+        1e6,
+        60.0,
+        60.0,
+    )
+    plug_gain_std: float = number(
+        '',
+        'how well the plug force is known: standard deviation of its gain',
+        1e-9,
+        1.0,
+        0.03,
+        0.03,
+    )
     plug_shape_std: float = number('', 'and of each entry of its table', 1e-9, 1.0, 0.01, 0.01)
-    material_friction: float = number('', 'change of friction that asks for maintenance', 0.0,
-                                      100.0, 0.3, 0.3)
-    material_spring: float = number('', 'change of stiffness that asks for maintenance', 0.0,
-                                    1.0, 0.02, 0.02)
-    material_supply: float = number('', "loss of the chamber's top filling rate that alarms",
-                                    0.01, 0.9, 0.1, 0.1)
-    supply_pressure: float = number('Pa', 'supply pressure of the positioner, gauge', 1e4, 5e6,
-                                    600e3, 600e3)
-    chamber_volume: float = number('m3', 'dead volume of the servomotor', 0.0, 10.0, 5.5e-3,
-                                   5.5e-3)
+    material_friction: float = number(
+        '', 'change of friction that asks for maintenance', 0.0, 100.0, 0.3, 0.3
+    )
+    material_spring: float = number(
+        '', 'change of stiffness that asks for maintenance', 0.0, 1.0, 0.02, 0.02
+    )
+    material_supply: float = number(
+        '', "loss of the chamber's top filling rate that alarms", 0.01, 0.9, 0.1, 0.1
+    )
+    supply_pressure: float = number(
+        'Pa', 'supply pressure of the positioner, gauge', 1e4, 5e6, 600e3, 600e3
+    )
+    chamber_volume: float = number(
+        'm3', 'dead volume of the servomotor', 0.0, 10.0, 5.5e-3, 5.5e-3
+    )
 
     # SCADA-rate monitor
-    false_alarm_days: float = number('d', 'mode scada: days per false alarm', 0.01, 1e5,
-                                     30.0, 30.0)
-    sensor_noise: float = number('', 'mode scada: standard deviation of the sensors / full scale',
-                                 1e-6, 0.1, 1.414e-3, 1.414e-3)
+    false_alarm_days: float = number(
+        'd', 'mode scada: days per false alarm', 0.01, 1e5, 30.0, 30.0
+    )
+    sensor_noise: float = number(
+        '',
+        'mode scada: standard deviation of the sensors / full scale',
+        1e-6,
+        0.1,
+        1.414e-3,
+        1.414e-3,
+    )
 
     # input check
-    signal_low: float = number('', 'cv and x1 below it are refused (NAMUR NE 43: 3.6 mA)', -1.0,
-                               0.0, -0.025, -0.025)
-    signal_high: float = number('', 'cv and x1 above it are refused (NAMUR NE 43: 21 mA)', 1.0,
-                                2.0, 1.0625, 1.0625)
+    signal_low: float = number(
+        '', 'cv and x1 below it are refused (NAMUR NE 43: 3.6 mA)', -1.0, 0.0, -0.025, -0.025
+    )
+    signal_high: float = number(
+        '', 'cv and x1 above it are refused (NAMUR NE 43: 21 mA)', 1.0, 2.0, 1.0625, 1.0625
+    )
     p_max: float = number('Pa', 'p1 and p2 above it are refused', 1e3, 1e9, 4.25e6, 4.25e6)
     ps_max: float = number('Pa', 'ps above it is refused', 1e3, 1e8, 1e6, 1e6)
-    gap_reset: float = number('s', 'a longer gap restarts the filters; what is learned stays',
-                              1e-3, 1e6, 2.0, 2.0)
-    hold: float = number('s', 'no decision for this time after such a restart', 0.0, 1e4,
-                         0.0, 1.0)
-    clock_jump: float = number('s', 'stamps further back than this may be a clock that was set '
-                               'back', 1e-3, 1e9, 1.0, 1.0)
+    gap_reset: float = number(
+        's', 'a longer gap restarts the filters; what is learned stays', 1e-3, 1e6, 2.0, 2.0
+    )
+    hold: float = number('s', 'no decision for this time after such a restart', 0.0, 1e4, 0.0, 1.0)
+    clock_jump: float = number(
+        's', 'stamps further back than this may be a clock that was set back', 1e-3, 1e9, 1.0, 1.0
+    )
     clock_jump_samples: int = number('', 'samples in order that confirm it', 2, 10000, 10, 10)
 
     def __post_init__(self) -> None:
@@ -275,8 +367,15 @@ class Settings:
         :return: per setting `name`, `type` (str, bool, int, float or tuple), `default`, `unit`,
             `description` and `low`, `high` or `choices` where they apply.
         """
-        return [{**item.metadata, 'name': item.name, 'type': type(item.default),
-                 'default': _default(item, mode)} for item in fields(cls)]
+        return [
+            {
+                **item.metadata,
+                'name': item.name,
+                'type': type(item.default),
+                'default': _default(item, mode),
+            }
+            for item in fields(cls)
+        ]
 
     def record(self) -> NDArray[Any]:
         """
@@ -299,8 +398,12 @@ class Settings:
 
 def _dtype() -> np.dtype:
     kinds: dict[type, Any] = {str: 'i8', bool: '?', int: 'i8', float: 'f8'}
-    columns = [(item.name, 'f8', (len(PLUG_TABLE),)) if item.name == 'plug_table'
-               else (item.name, kinds[type(item.default)]) for item in fields(Settings)]
+    columns = [
+        (item.name, 'f8', (len(PLUG_TABLE),))
+        if item.name == 'plug_table'
+        else (item.name, kinds[type(item.default)])
+        for item in fields(Settings)
+    ]
     derived = [(name, 'f8') for name in ('dt', 'weight', 'area_per_force', 'plug_per_force')]
     return np.dtype((np.record, np.dtype([*columns, *derived], align=True)))
 
@@ -313,17 +416,25 @@ def _default(item: Field, mode: str) -> Any:
 def _contradictions(s: Settings) -> list[str]:
     checks = [
         (s.decide_m <= s.decide_n, 'decide_m is larger than decide_n: no decision is possible'),
-        (s.level_maintenance <= s.level_specification <= s.level_failure,
-         'the levels must not fall: level_maintenance <= level_specification <= level_failure'),
+        (
+            s.level_maintenance <= s.level_specification <= s.level_failure,
+            'the levels must not fall: level_maintenance <= level_specification <= level_failure',
+        ),
     ]
     if s.mode == 'monitor':
         checks += [
             (s.dz >= s.delta, 'dz is below delta: Phi would grow inside the boundary layer'),
-            (s.rho_min > s.dz, 'rho_min is not larger than dz: the threshold could end inside the '
-             'dead-zone and alarm for ever'),
+            (
+                s.rho_min > s.dz,
+                'rho_min is not larger than dz: the threshold could end inside the '
+                'dead-zone and alarm for ever',
+            ),
             (s.t_on <= s.t_w <= s.t_learn, 't_on <= t_w <= t_learn does not hold'),
-            (s.consistent or s.velocity == 'super_twisting', 'consistent is off: the filter lag '
-             'would show as a fault; switch it on or choose velocity super_twisting'),
+            (
+                s.consistent or s.velocity == 'super_twisting',
+                'consistent is off: the filter lag '
+                'would show as a fault; switch it on or choose velocity super_twisting',
+            ),
         ]
     return [text for holds, text in checks if not holds]
 

@@ -41,8 +41,13 @@ class Thinner:
         if block:
             rows = _extremes(columns, result, block)
             columns = {name: values[rows] for name, values in columns.items()}
-            result = Result(result.reason[rows], result.estimates[rows], result.decisions[rows],
-                            result.estimator, result.detector)
+            result = Result(
+                result.reason[rows],
+                result.estimates[rows],
+                result.decisions[rows],
+                result.estimator,
+                result.detector,
+            )
         self._pieces.append((result, columns))
         self._rows += len(result.reason)
 
@@ -54,7 +59,8 @@ class Thinner:
             np.concatenate([result.reason for result in results]),
             np.concatenate([result.estimates for result in results]),
             np.concatenate([result.decisions for result in results]),
-            results[-1].estimator, results[-1].detector,
+            results[-1].estimator,
+            results[-1].detector,
         )
         return joined, {
             name: np.concatenate([columns[name] for _, columns in self._pieces]) for name in names
@@ -68,8 +74,11 @@ def _extremes(columns: Columns, result: Result, block: int) -> NDArray[np.intp]:
     first = np.arange(0, whole, block)
     keep = [first, np.arange(whole, min(whole + 1, count))]
     for signal in (
-        result.estimates['xi1'], result.estimates['xi2'], result.decisions['residual'],
-        columns['x1'], columns['cv'],
+        result.estimates['xi1'],
+        result.estimates['xi2'],
+        result.decisions['residual'],
+        columns['x1'],
+        columns['cv'],
     ):
         values = np.nan_to_num(signal)
         blocks = values[:whole].reshape(len(first), min(block, count))

@@ -16,20 +16,48 @@ POINTS = 3000  # per curve: more than a page can show
 BLUE, ORANGE, RED, GREEN, GREY = '#1f6fb4', '#e07b00', '#c8102e', '#2e8b57', '#8a8f98'
 INK = '#22262b'
 STYLE: Any = {
-    'font.size': 9.5, 'font.family': 'DejaVu Sans', 'mathtext.fontset': 'dejavusans',
-    'text.color': INK, 'axes.labelcolor': INK, 'axes.edgecolor': '#b9bec6',
-    'axes.spines.top': False, 'axes.spines.right': False, 'axes.linewidth': 0.8,
-    'axes.grid': True, 'grid.color': '#e8eaee', 'grid.linewidth': 0.8,
-    'xtick.color': '#5a6068', 'ytick.color': '#5a6068', 'axes.formatter.limits': (-3, 4),
-    'axes.formatter.use_mathtext': True, 'lines.linewidth': 1.1, 'legend.frameon': False,
-    'legend.fontsize': 9, 'axes.axisbelow': True,
+    'font.size': 9.5,
+    'font.family': 'DejaVu Sans',
+    'mathtext.fontset': 'dejavusans',
+    'text.color': INK,
+    'axes.labelcolor': INK,
+    'axes.edgecolor': '#b9bec6',
+    'axes.spines.top': False,
+    'axes.spines.right': False,
+    'axes.linewidth': 0.8,
+    'axes.grid': True,
+    'grid.color': '#e8eaee',
+    'grid.linewidth': 0.8,
+    'xtick.color': '#5a6068',
+    'ytick.color': '#5a6068',
+    'axes.formatter.limits': (-3, 4),
+    'axes.formatter.use_mathtext': True,
+    'lines.linewidth': 1.1,
+    'legend.frameon': False,
+    'legend.fontsize': 9,
+    'axes.axisbelow': True,
 }
 NAMES = {
-    0: 'no fault', 1: 'valve clogging', 2: 'sedimentation', 3: 'erosion', 4: 'friction',
-    5: 'external leakage', 6: 'internal leakage', 7: 'evaporation', 8: 'twisted rod',
-    9: 'housing tightness', 10: 'diaphragm perforation', 11: 'spring', 12: 'E/P transducer',
-    13: 'position sensor', 14: 'pressure sensor', 15: 'positioner feedback',
-    16: 'supply pressure drop', 17: 'pressure change', 18: 'bypass opened', 19: 'flow sensor',
+    0: 'no fault',
+    1: 'valve clogging',
+    2: 'sedimentation',
+    3: 'erosion',
+    4: 'friction',
+    5: 'external leakage',
+    6: 'internal leakage',
+    7: 'evaporation',
+    8: 'twisted rod',
+    9: 'housing tightness',
+    10: 'diaphragm perforation',
+    11: 'spring',
+    12: 'E/P transducer',
+    13: 'position sensor',
+    14: 'pressure sensor',
+    15: 'positioner feedback',
+    16: 'supply pressure drop',
+    17: 'pressure change',
+    18: 'bypass opened',
+    19: 'flow sensor',
 }
 
 
@@ -59,7 +87,10 @@ def envelope(t: NDArray, y: NDArray, points: int = POINTS) -> tuple[NDArray, NDA
 
 
 def six_panels(
-    result: Result, columns: Mapping[str, NDArray], path: str | Path, title: str = '',
+    result: Result,
+    columns: Mapping[str, NDArray],
+    path: str | Path,
+    title: str = '',
 ) -> Path:
     """
     Draw xi1; xi2; |xi2| and rho; fault strength; decision; CV and X (Figs. 5 and 6).
@@ -87,8 +118,9 @@ def six_panels(
         axes = figure.subplots(3, 2, sharex=True)
         armed = np.isin(result.estimates['phase'], (PHASE_MONITOR, PHASE_PAPER))
         _error(axes[0, 0], t, result.estimates['xi1'], armed, r'position error  $\xi_1$', 'stroke')
-        _error(axes[0, 1], t, result.estimates['xi2'], armed, r'velocity error  $\xi_2$',
-               'stroke/s')
+        _error(
+            axes[0, 1], t, result.estimates['xi2'], armed, r'velocity error  $\xi_2$', 'stroke/s'
+        )
         _residual(axes[1, 0], t, result.decisions)
         for axis, text in ((axes[1, 0], ''), (axes[2, 0], 'no decision yet')):
             _learning(axis, t, armed, text)
@@ -113,7 +145,12 @@ def six_panels(
 
 
 def _error(
-    axis: Any, t: NDArray, error: NDArray, armed: NDArray[np.bool_], title: str, unit: str,
+    axis: Any,
+    t: NDArray,
+    error: NDArray,
+    armed: NDArray[np.bool_],
+    title: str,
+    unit: str,
 ) -> None:
     """Draw an error, scaled so that its ticks are short; what precedes the decision may leave."""
     known = np.isfinite(error)
@@ -160,8 +197,15 @@ def _strength(axis: Any, t: NDArray, columns: Mapping[str, NDArray]) -> float | 
     axis.set_ylim(-0.05, 1.1)
     if 'strength' not in columns:
         axis.set_title('fault strength')
-        axis.text(0.5, 0.5, 'not known for this recording', color=GREY, ha='center', va='center',
-                  transform=axis.transAxes)
+        axis.text(
+            0.5,
+            0.5,
+            'not known for this recording',
+            color=GREY,
+            ha='center',
+            va='center',
+            transform=axis.transAxes,
+        )
         return None
     strength = np.asarray(columns['strength'], float)
     axis.fill_between(*envelope(t, strength), color=GREEN, alpha=0.15, linewidth=0)
@@ -176,8 +220,14 @@ def _strength(axis: Any, t: NDArray, columns: Mapping[str, NDArray]) -> float | 
     onset = float(t[max(active[0] - ramp, 0)])
     number = int(columns['fault'][active[-1]]) if 'fault' in columns else 0
     name = f'f{number} {NAMES.get(number, "")}, ' if number else ''
-    axis.annotate(f'{name}from {onset:g} s', (onset, 0.5), xytext=(-6, 0), ha='right',
-                  textcoords='offset points', color=GREEN)
+    axis.annotate(
+        f'{name}from {onset:g} s',
+        (onset, 0.5),
+        xytext=(-6, 0),
+        ha='right',
+        textcoords='offset points',
+        color=GREEN,
+    )
     return onset
 
 
@@ -201,10 +251,16 @@ def _decision(axis: Any, t: NDArray, result: Result, zero: int, onset: float | N
         first = float(after[0])
         axis.plot(first, 1.1, 'v', color=RED, markersize=7, clip_on=False)
         right = first > 0.6 * t[-1] + 0.4 * t[0]
-        axis.annotate(f'detected {first:.4f} s', (first, 1.1), xytext=(0, 7), color=RED,
-                      textcoords='offset points', ha='right' if right else 'left',
-                      fontweight='bold',
-                      bbox={'color': 'white', 'pad': 1.0})
+        axis.annotate(
+            f'detected {first:.4f} s',
+            (first, 1.1),
+            xytext=(0, 7),
+            color=RED,
+            textcoords='offset points',
+            ha='right' if right else 'left',
+            fontweight='bold',
+            bbox={'color': 'white', 'pad': 1.0},
+        )
     if not len(times):
         axis.text(0.5, 0.6, 'no fault flagged', color=GREY, ha='center', transform=axis.transAxes)
 
@@ -213,6 +269,13 @@ def _valve(axis: Any, t: NDArray, columns: Mapping[str, NDArray]) -> None:
     axis.plot(*envelope(t, columns['cv']), color=GREY, linewidth=1.2, label='CV')
     axis.plot(*envelope(t, columns['x1']), color=BLUE, linewidth=1.5, label='X')
     axis.set_ylim(-0.05, 1.3)
-    axis.legend(loc='upper right', ncols=2, borderaxespad=0.1, frameon=True, framealpha=1.0,
-                edgecolor='none', facecolor='white')
+    axis.legend(
+        loc='upper right',
+        ncols=2,
+        borderaxespad=0.1,
+        frameon=True,
+        framealpha=1.0,
+        edgecolor='none',
+        facecolor='white',
+    )
     axis.set_title('control value CV and stem position X  [stroke]')

@@ -95,8 +95,13 @@ class ForceMap:
         return t[1:-1][keep], x[1:-1][keep], force[1:-1][keep], dp[1:-1][keep], v[keep]
 
 
-def force_over_position(force_map: ForceMap, signature: Signature, path: Path | str,
-                        tag: str = 'valve', causes: CauseTable | None = None) -> Path:
+def force_over_position(
+    force_map: ForceMap,
+    signature: Signature,
+    path: Path | str,
+    tag: str = 'valve',
+    causes: CauseTable | None = None,
+) -> Path:
     """
     Draw force over position and, enlarged, its distance from the learned spring line.
 
@@ -133,8 +138,13 @@ def force_over_position(force_map: ForceMap, signature: Signature, path: Path | 
             axis.set_xlim(0.0, 1.0)
         grid = np.linspace(0.03, 0.97, 200)
         mean_dp = float(np.mean(dp)) if len(dp) else 0.0
-        whole.plot(grid, _spring_line(signature, grid, np.full(200, mean_dp)), color=INK,
-                   linewidth=1.0, label='learned spring line')
+        whole.plot(
+            grid,
+            _spring_line(signature, grid, np.full(200, mean_dp)),
+            color=INK,
+            linewidth=1.0,
+            label='learned spring line',
+        )
         speed = float(np.mean(abs(v))) if len(v) else 0.1
         band = (s.theta[SIGN] + s.theta[V] * speed) * signature.settings.force_scale
         _friction_lines(close, grid, np.zeros(200), band, BLUE, 'learned')
@@ -146,21 +156,28 @@ def force_over_position(force_map: ForceMap, signature: Signature, path: Path | 
         close.axhline(0.0, color=GREY, linewidth=0.8)
         lines, names = close.get_legend_handles_labels()
         keep = [k for k, name in enumerate(names) if 'friction' in name]
-        close.legend([lines[k] for k in keep], [names[k] for k in keep], frameon=True,
-                     edgecolor='none', framealpha=0.85)
+        close.legend(
+            [lines[k] for k in keep],
+            [names[k] for k in keep],
+            frameon=True,
+            edgecolor='none',
+            framealpha=0.85,
+        )
         handles, _ = whole.get_legend_handles_labels()
         if handles:
             whole.legend(loc='upper left', markerscale=2.0)
-        figure.suptitle(title.replace('+-', '±'), fontsize=12, fontweight='bold', x=0.012,
-                        ha='left')
+        figure.suptitle(
+            title.replace('+-', '±'), fontsize=12, fontweight='bold', x=0.012, ha='left'
+        )
         path = Path(path)
         path.parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(path, dpi=150, facecolor='white')
     return path
 
 
-def _changed(signature: Signature, view: SignatureView, x: Array,
-             band: float) -> tuple[Array, float]:
+def _changed(
+    signature: Signature, view: SignatureView, x: Array, band: float
+) -> tuple[Array, float]:
     """Return what the named cause makes of the spring line and of the friction [N]."""
     s, c = signature.state[0], signature.settings
     shift = np.zeros(len(x))
@@ -175,14 +192,16 @@ def _changed(signature: Signature, view: SignatureView, x: Array,
     return shift, band
 
 
-def _friction_lines(axis: Any, x: Array, middle: Array, band: float, color: str,
-                    label: str) -> None:
+def _friction_lines(
+    axis: Any, x: Array, middle: Array, band: float, color: str, label: str
+) -> None:
     """Draw the branches of a valve with this friction around its spring line."""
     if not np.isfinite(band):
         return
     for side, name in ((-1.0, None), (1.0, f'{label}: friction {band:.0f} N')):
-        axis.plot(x, middle + side * band, color=color, linewidth=1.2, linestyle=(0, (5, 3)),
-                  label=name)
+        axis.plot(
+            x, middle + side * band, color=color, linewidth=1.2, linestyle=(0, (5, 3)), label=name
+        )
 
 
 def _spring_line(signature: Signature, x: Array, dp: Array) -> Array:
@@ -195,11 +214,20 @@ def _spring_line(signature: Signature, x: Array, dp: Array) -> Array:
     return line
 
 
-def _branches(axis: Any, x: Array, y: Array, v: Array, part: NDArray[np.bool_], color: str,
-              label: str) -> None:
+def _branches(
+    axis: Any, x: Array, y: Array, v: Array, part: NDArray[np.bool_], color: str, label: str
+) -> None:
     for rising, marker, name in ((True, '^', 'closing'), (False, 'v', 'opening')):
         keep = np.flatnonzero(part & ((v > 0.0) == rising))
         keep = keep[:: max(1, len(keep) // POINTS)]
         if len(keep):
-            axis.plot(x[keep], y[keep], marker, color=color, markersize=2.6, alpha=0.6,
-                      markeredgewidth=0.0, label=f'{label}, {name}')
+            axis.plot(
+                x[keep],
+                y[keep],
+                marker,
+                color=color,
+                markersize=2.6,
+                alpha=0.6,
+                markeredgewidth=0.0,
+                label=f'{label}, {name}',
+            )

@@ -56,8 +56,13 @@ class DetectorNode(MonitoringNode):
         self._fault_event = self.create_publisher(FaultEvent, 'fault_event', qos.EVENTS)
         self._rival = RivalWatch(self, self.refuse)
         self._signature = SignaturePublisher(
-            self, self._core.signature, self.actuator, self.settings,
-            self._folder_of(self._signature_folder, self._valve()), self._causes.limits)
+            self,
+            self._core.signature,
+            self.actuator,
+            self.settings,
+            self._folder_of(self._signature_folder, self._valve()),
+            self._causes.limits,
+        )
         OperatorServices(self, self._core, self._operated)
         self._was_silent = True
         self.start()
@@ -71,14 +76,22 @@ class DetectorNode(MonitoringNode):
     def declare_more(self) -> None:
         """Declare where alarms are kept."""
         self._folder = self.parameters.declare(
-            'alarm_folder', 'auto', 'folder that keeps the alarms over a restart; "auto": one of '
+            'alarm_folder',
+            'auto',
+            'folder that keeps the alarms over a restart; "auto": one of '
             'the user, in mode paper none; "": none',
         )
-        self._causes = read_causes(self.parameters.declare(
-            'causes_file', '', 'YAML file with texts and advice per cause; "": the own ones'))
+        self._causes = read_causes(
+            self.parameters.declare(
+                'causes_file', '', 'YAML file with texts and advice per cause; "": the own ones'
+            )
+        )
         self._signature_folder = self.parameters.declare(
-            'signature_folder', 'auto', 'folder that keeps signature and trends over a restart; '
-            '"auto": beside the alarms, in mode paper none; "": none')
+            'signature_folder',
+            'auto',
+            'folder that keeps signature and trends over a restart; '
+            '"auto": beside the alarms, in mode paper none; "": none',
+        )
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Begin afresh, with the alarms from before where they are kept."""
@@ -153,8 +166,9 @@ class DetectorNode(MonitoringNode):
             try:
                 self._store.save(self._core.save())
             except OSError as problem:
-                self.get_logger().error(f'the alarm would not survive a restart: {problem}',
-                                        throttle_duration_sec=60.0)
+                self.get_logger().error(
+                    f'the alarm would not survive a restart: {problem}', throttle_duration_sec=60.0
+                )
 
     def _look(self) -> None:
         """Turn to "not monitoring" when the input falls silent."""

@@ -63,7 +63,9 @@ class EstimatorNode(MonitoringNode):
     def declare_more(self) -> None:
         """Declare where the reference is kept."""
         self._path = self.parameters.declare(
-            'reference', '', 'file with what was learned, without ".a.json"; loaded at the start, '
+            'reference',
+            '',
+            'file with what was learned, without ".a.json"; loaded at the start, '
             'written when learning ends; "": learn at every start',
         )
 
@@ -97,7 +99,10 @@ class EstimatorNode(MonitoringNode):
     def _save(self, path: str, source: str) -> tuple[bool, str]:
         try:
             reference = Reference(
-                self.actuator, self._core.learned(), self.settings.to_dict(), source=source,
+                self.actuator,
+                self._core.learned(),
+                self.settings.to_dict(),
+                source=source,
                 last_stamp=int(self._core.quality[0].stamp),
             )
             return True, f'reference saved: {save_reference(Path(path).expanduser(), reference)}'

@@ -30,8 +30,9 @@ class InputWatch:
     :param period: nominal time between two messages [s].
     """
 
-    def __init__(self, node: Node, topic: str, command: str, timeout: float,
-                 period: float = 0.0) -> None:
+    def __init__(
+        self, node: Node, topic: str, command: str, timeout: float, period: float = 0.0
+    ) -> None:
         self.timeout = timeout
         self._node = node
         self._topic = topic
@@ -58,6 +59,7 @@ class InputWatch:
         :param profile: quality of service; no deadline, for a publisher that offers none would
             then not be heard at all.
         """
+
         def arrived(message: Any) -> None:
             self._wall = time.monotonic()
             if self._simulated:

@@ -27,8 +27,9 @@ class MonitoringNode(LifecycleNode, ABC):
     :param arguments: ROS arguments of this node alone; those of the process by default.
     """
 
-    def __init__(self, name: str, topic: str, command: str,
-                 arguments: list[str] | None = None) -> None:
+    def __init__(
+        self, name: str, topic: str, command: str, arguments: list[str] | None = None
+    ) -> None:
         super().__init__(name, cli_args=arguments, use_global_arguments=arguments is None)
         self.finished = False
         self.exit_code = 0
@@ -37,8 +38,12 @@ class MonitoringNode(LifecycleNode, ABC):
         declare = self.parameters.declare
         self.actuator = declare('actuator', '', 'tag of the actuator') or 'actuator'
         timeout = declare(
-            'input_timeout', 0.5, 'silence after which the valve is not monitored [s]; three '
-            'sample periods where that is longer', limits=TIMEOUT_LIMITS, live=True,
+            'input_timeout',
+            0.5,
+            'silence after which the valve is not monitored [s]; three '
+            'sample periods where that is longer',
+            limits=TIMEOUT_LIMITS,
+            live=True,
         )
         self._autostart = declare('autostart', True, 'configure and activate by itself')
         self.declare_more()

@@ -12,7 +12,8 @@ from damadics_fd.ros.arguments import command_parser
 from damadics_fd.ros.spin import SpinnableNode, spin_all
 
 NODES: dict[str, Callable[[list[str]], SpinnableNode]] = {
-    'estimator': EstimatorNode, 'detector': DetectorNode,
+    'estimator': EstimatorNode,
+    'detector': DetectorNode,
 }
 SEPARATOR = '--'
 EXAMPLES = """example, one valve:
@@ -50,16 +51,25 @@ def main(args: list[str] | None = None) -> int:
     """
     words = list(sys.argv[1:] if args is None else args)
     p = command_parser(
-        'monitors', 'Run estimators and detectors of many valves in one process: at high sample '
-        'rates half the cost of one process each.', EXAMPLES)
-    p.add_argument('node', nargs='+', metavar='NODE [--ros-args ...] [--]',
-                   help='estimator or detector with its own ROS arguments')
+        'monitors',
+        'Run estimators and detectors of many valves in one process: at high sample '
+        'rates half the cost of one process each.',
+        EXAMPLES,
+    )
+    p.add_argument(
+        'node',
+        nargs='+',
+        metavar='NODE [--ros-args ...] [--]',
+        help='estimator or detector with its own ROS arguments',
+    )
     groups = groups_of(words)
     p.parse_args([group[0] for group in groups])  # --help, or nothing at all
     unknown = [group[0] for group in groups if group[0] not in NODES]
     if unknown:
-        p.error(f'there is no node {unknown[0]}; there are {", ".join(NODES)}, with '
-                f'"{SEPARATOR}" between two of them')
+        p.error(
+            f'there is no node {unknown[0]}; there are {", ".join(NODES)}, with '
+            f'"{SEPARATOR}" between two of them'
+        )
     # The process takes its enclave and log level from all words, the nodes theirs from their own.
     return spin_all([partial(NODES[name], own) for name, *own in groups], words)
 

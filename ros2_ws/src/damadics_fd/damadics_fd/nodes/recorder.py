@@ -52,8 +52,11 @@ def describe(profile: QoSProfile) -> rosbag2.QosProfile:
         nanoseconds = getattr(profile, name).nanoseconds
         spans[name] = {'sec': nanoseconds // 10**9, 'nsec': nanoseconds % 10**9}
     return rosbag2.qos(
-        profile.reliability.name.lower(), profile.durability.name.lower(),
-        profile.history.name.lower(), profile.depth, liveliness=profile.liveliness.name.lower(),
+        profile.reliability.name.lower(),
+        profile.durability.name.lower(),
+        profile.history.name.lower(),
+        profile.depth,
+        liveliness=profile.liveliness.name.lower(),
         **spans,
     )
 
@@ -158,7 +161,11 @@ class Recorder(Node):
         # in this executor while messages arrive (seen in rclpy 7.1.6, message_lost)
         events = SubscriptionEventCallbacks(use_default_callbacks=False)
         subscription = self.create_subscription(
-            message_type, name, receive, matching(reliable, latched), raw=True,
+            message_type,
+            name,
+            receive,
+            matching(reliable, latched),
+            raw=True,
             event_callbacks=events,
         )
         self._recorded[name] = Recorded(topic, subscription, reliable, latched, sequence)
@@ -175,7 +182,9 @@ class Recorder(Node):
         """Publish what is recorded, waiting, lost and dropped."""
         spool, bag = self._spool, self._spool.bag
         status = DiagnosticStatus(
-            name='recorder: bag', hardware_id=str(bag.path), level=DiagnosticStatus.OK,
+            name='recorder: bag',
+            hardware_id=str(bag.path),
+            level=DiagnosticStatus.OK,
             message='recording',
         )
         if spool.error or spool.dropped:
@@ -188,8 +197,10 @@ class Recorder(Node):
             status.level = DiagnosticStatus.WARN
             status.message = 'topics refused'
         values = {
-            'Size (B)': bag.size, 'Messages waiting': spool.waiting,
-            'Messages dropped': spool.dropped, 'Free disk (B)': free_bytes(bag.path),
+            'Size (B)': bag.size,
+            'Messages waiting': spool.waiting,
+            'Messages dropped': spool.dropped,
+            'Free disk (B)': free_bytes(bag.path),
             'Topics refused': ' '.join(sorted(self._refused)),
             **{f'Messages on {name}': count for name, count in bag.counts.items()},
             **{f'Messages lost on {name}': count for name, count in self.lost.items() if count},

@@ -40,8 +40,10 @@ class RivalWatch:
             return
         self._heard = self._sent
         topic = self._node.resolve_topic_name('fault_flag')
-        cause = (f'another detector sends on {topic}: give each valve a namespace of its own '
-                 '(--ros-args -r __ns:=/lv101), or end the other')
+        cause = (
+            f'another detector sends on {topic}: give each valve a namespace of its own '
+            '(--ros-args -r __ns:=/lv101), or end the other'
+        )
         if time.monotonic() - self._since < NEWCOMER:
             self._refuse(cause)
         else:

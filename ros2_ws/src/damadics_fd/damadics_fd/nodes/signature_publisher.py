@@ -55,8 +55,15 @@ class SignaturePublisher:
     :param limits: of the trends, per quantity.
     """
 
-    def __init__(self, node: Node, signature: Signature, actuator: str, settings: Settings,
-                 folder: Path | None, limits: Mapping[str, Sequence[float]]) -> None:
+    def __init__(
+        self,
+        node: Node,
+        signature: Signature,
+        actuator: str,
+        settings: Settings,
+        folder: Path | None,
+        limits: Mapping[str, Sequence[float]],
+    ) -> None:
         self._node = node
         self._signature = signature
         self._actuator = actuator
@@ -104,8 +111,10 @@ class SignaturePublisher:
     def values(self) -> dict[str, str]:
         """Cause and outlook of each trend, for the diagnostics."""
         view = self._signature.view()
-        return {'Cause': view.cause.replace('_', ' '),
-                **{f'Trend of {o.quantity}': o.sentence() for o in self._outlook}}
+        return {
+            'Cause': view.cause.replace('_', ' '),
+            **{f'Trend of {o.quantity}': o.sentence() for o in self._outlook},
+        }
 
     def update(self, header: Header, stamp: int) -> None:
         """
@@ -125,7 +134,8 @@ class SignaturePublisher:
             except OSError as problem:
                 self._node.get_logger().error(
                     f'signature and trend are not kept: {problem}; check folder and free space',
-                    throttle_duration_sec=60.0)
+                    throttle_duration_sec=60.0,
+                )
         self._outlook = self._trend.outlook(self._limits, stamp * 1e-9) if self._trend else []
         message = signature_message(self._signature, header)
         write_outlook(self._outlook, message)
@@ -137,9 +147,17 @@ class SignaturePublisher:
         if self._trend is None or (s.theta.tolist(), float(s.unit_weight)) != known:
             saved = self._signature.save()
             if saved != self._saved:
-                save_reference(self._path(folder), Reference(
-                    self._actuator, {}, self._settings.to_dict(), saved, source='live',
-                    last_stamp=stamp))
+                save_reference(
+                    self._path(folder),
+                    Reference(
+                        self._actuator,
+                        {},
+                        self._settings.to_dict(),
+                        saved,
+                        source='live',
+                        last_stamp=stamp,
+                    ),
+                )
                 self._saved = saved
             self._trend = TrendFile(folder, self._actuator, series_name(saved))
         if s.now_t:
@@ -159,14 +177,25 @@ def signature_message(signature: Signature, header: Header) -> SignatureMessage:
     """
     s, view = signature.state[0], signature.view()
     message = SignatureMessage(
-        header=header, state=view.state, family=view.family, cause=int(s.cause),
+        header=header,
+        state=view.state,
+        family=view.family,
+        cause=int(s.cause),
         second=int(s.second) if s.cause == SignatureMessage.CAUSE_ELASTIC else 0,
         own_alarm_ready=bool(own_alarm_ready(s, signature.record[0])),
-        progress=signature.progress, value=view.value, std=view.std, confidence=view.confidence,
-        d=float(s.D.max()), kappa=float(s.kappa), sigma=float(s.sigma),
+        progress=signature.progress,
+        value=view.value,
+        std=view.std,
+        confidence=view.confidence,
+        d=float(s.D.max()),
+        kappa=float(s.kappa),
+        sigma=float(s.sigma),
         stick_ratio=float(s.r_max / s.r_ref) if s.r_ref > 0.0 else 0.0,
-        theta=s.theta[:4].tolist(), change=s.now.tolist(), change_std=s.now_std.tolist(),
-        fill=float(s.air_rate[0]), vent=float(s.air_rate[1]),
+        theta=s.theta[:4].tolist(),
+        change=s.now.tolist(),
+        change_std=s.now_std.tolist(),
+        fill=float(s.air_rate[0]),
+        vent=float(s.air_rate[1]),
     )
     if s.own:
         message.source = SignatureMessage.SOURCE_OWN

@@ -35,13 +35,18 @@ def command_parser(name: str, description: str, examples: str) -> argparse.Argum
     :return: a parser without arguments.
     """
     return argparse.ArgumentParser(
-        prog=name, description=description, epilog=examples,
+        prog=name,
+        description=description,
+        epilog=examples,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
 
 
 def check_node_arguments(
-    name: str, description: str, examples: str, args: Sequence[str] | None,
+    name: str,
+    description: str,
+    examples: str,
+    args: Sequence[str] | None,
 ) -> None:
     """
     Answer `--help` of a node and refuse words that it would not see.

@@ -70,7 +70,10 @@ def read_estimate(message: EstimateMessage) -> Estimate:
     """
     alpha1, alpha4, alpha5 = message.alpha_hat.tolist()
     return Estimate(
-        stamp=nanoseconds(message.header.stamp), alpha1=alpha1, alpha4=alpha4, alpha5=alpha5,
+        stamp=nanoseconds(message.header.stamp),
+        alpha1=alpha1,
+        alpha4=alpha4,
+        alpha5=alpha5,
         **{name: getattr(message, name) for name in SCALARS},
     )
 
@@ -102,7 +105,19 @@ def event_message(event: Event, frame_id: str) -> FaultEvent:
     message.header.frame_id = frame_id
     set_stamp(message.header.stamp, event.stamp)
     set_stamp(message.onset, event.onset)
-    for name in ('transition', 'occurrence', 'level', 'residual', 'threshold', 'ratio', 'duration',
-                 'cause', 'confidence', 'strength', 'text', 'advice'):
+    for name in (
+        'transition',
+        'occurrence',
+        'level',
+        'residual',
+        'threshold',
+        'ratio',
+        'duration',
+        'cause',
+        'confidence',
+        'strength',
+        'text',
+        'advice',
+    ):
         setattr(message, name, getattr(event, name))
     return message

@@ -68,8 +68,10 @@ class Parameters:
             value = self._node.declare_parameter(name, default, descriptor).value
         except InvalidParameterTypeException:
             given = self._given()[name].value
-            kind = 'a number with a decimal point' if isinstance(default, float) else (
-                f'of type {type(default).__name__}'
+            kind = (
+                'a number with a decimal point'
+                if isinstance(default, float)
+                else (f'of type {type(default).__name__}')
             )
             self._refuse(name, f'{given!r} is not {kind}', description)
             return default

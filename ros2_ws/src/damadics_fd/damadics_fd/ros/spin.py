@@ -47,7 +47,8 @@ def spin_until(done: Callable[[], bool], executor: EventsExecutor, nodes: Sequen
         while not done():
             ended: Future = Future()
             timer = nodes[0].create_timer(
-                LOOK, lambda ended=ended: ended.set_result(None) if done() else None, clock=steady)
+                LOOK, lambda ended=ended: ended.set_result(None) if done() else None, clock=steady
+            )
             # Never untimed: an untimed spin of this executor does not return in some builds. Many
             # callbacks a call, where spin_once returns after each.
             executor.spin_until_future_complete(ended, LONG)

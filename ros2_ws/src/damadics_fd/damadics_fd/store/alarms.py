@@ -12,8 +12,7 @@ from damadics_fd.ros.arguments import state_folder
 FORMAT = 'damadics_fd alarm 1'
 EPOCH = 10**17  # ns; smaller stamps count from the start of a simulated run
 # what makes an alarm another one; the rest of the state changes with every sample
-MARKS = ('active', 'latched', 'acknowledged', 'occurrence', 'worst', 'shelved_until',
-         'told')
+MARKS = ('active', 'latched', 'acknowledged', 'occurrence', 'worst', 'shelved_until', 'told')
 
 
 def default_folder() -> Path:
@@ -60,8 +59,10 @@ class AlarmStore:
             return None
         except (OSError, ValueError, RecursionError) as problem:
             raise ValueError(f'{self.path}: {problem}') from problem
-        if not isinstance(document, dict) or document.get('format') != FORMAT or not isinstance(
-            document.get('state'), dict
+        if (
+            not isinstance(document, dict)
+            or document.get('format') != FORMAT
+            or not isinstance(document.get('state'), dict)
         ):
             raise ValueError(f'{self.path}: not in the format "{FORMAT}"')
         return document['state']

@@ -29,9 +29,29 @@ FORMAT = 'damadics_fd reference 1'
 SLOTS = ('a', 'b')
 CLOCK_TOLERANCE = 86400.0  # s; a file from later than that is from a wrong clock
 # settings that the learned numbers depend on; the others may change after learning
-BINDING = ('mode', 'velocity', 'tau', 'wn', 'lipschitz', 'consistent', 'k1', 'k2', 'coupling',
-           'alpha1', 'alpha4', 'alpha5', 'delta', 'mass', 'stiffness', 'stroke', 'preload', 'area',
-           'plug_diameter', 'gravity', 'plug_table')
+BINDING = (
+    'mode',
+    'velocity',
+    'tau',
+    'wn',
+    'lipschitz',
+    'consistent',
+    'k1',
+    'k2',
+    'coupling',
+    'alpha1',
+    'alpha4',
+    'alpha5',
+    'delta',
+    'mass',
+    'stiffness',
+    'stroke',
+    'preload',
+    'area',
+    'plug_diameter',
+    'gravity',
+    'plug_table',
+)
 
 
 class ReferenceFileError(ValueError):
@@ -89,8 +109,9 @@ def save_reference(path: Path | str, reference: Reference, now: float | None = N
     return target
 
 
-def load_reference(path: Path | str, actuator: str, settings: Settings,
-                   now: float | None = None) -> Reference:
+def load_reference(
+    path: Path | str, actuator: str, settings: Settings, now: float | None = None
+) -> Reference:
     """
     Read the newest good slot.
 
@@ -173,10 +194,15 @@ def _check(reference: Reference, actuator: str, settings: Settings, now: float) 
     if reference.actuator != actuator:
         raise ValueError(f'belongs to {reference.actuator}, not to {actuator}')
     if reference.created > now + CLOCK_TOLERANCE or not math.isfinite(reference.created):
-        raise ValueError(f'was written {(reference.created - now) / 86400:.1f} days in the '
-                         'future: set the clock right')
+        raise ValueError(
+            f'was written {(reference.created - now) / 86400:.1f} days in the '
+            'future: set the clock right'
+        )
     present = settings.to_dict()
-    changed = [f'{name} = {present[name]} was {reference.settings.get(name)}'
-               for name in BINDING if present[name] != reference.settings.get(name)]
+    changed = [
+        f'{name} = {present[name]} was {reference.settings.get(name)}'
+        for name in BINDING
+        if present[name] != reference.settings.get(name)
+    ]
     if changed:
         raise ValueError(f'was learned with other settings ({", ".join(changed)}): learn anew')

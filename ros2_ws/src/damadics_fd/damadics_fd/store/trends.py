@@ -44,8 +44,10 @@ class Outlook:
             return f'{now}, not moving towards its limit {self.limit:g}'
         if self.time.expected == 0.0:
             return f'{now}, beyond its limit {self.limit:g}'
-        return (f'{now}, limit {self.limit:g} in {_span(self.time.expected)} '
-                f'({_span(self.time.earliest)} to {_span(self.time.latest)})')
+        return (
+            f'{now}, limit {self.limit:g} in {_span(self.time.expected)} '
+            f'({_span(self.time.earliest)} to {_span(self.time.latest)})'
+        )
 
 
 def _span(seconds: float) -> str:
@@ -82,11 +84,14 @@ class TrendFile:
     :raises ValueError: if the tag cannot be part of a file name.
     """
 
-    def __init__(self, folder: Path, actuator: str, reference: str,
-                 interval: float = INTERVAL) -> None:
+    def __init__(
+        self, folder: Path, actuator: str, reference: str, interval: float = INTERVAL
+    ) -> None:
         if not actuator or set(actuator) & set('/\\\0') or actuator in ('.', '..'):
-            raise ValueError(f'actuator tag {actuator!r} cannot be part of a file name; '
-                             'use letters, digits, "_" and "-"')
+            raise ValueError(
+                f'actuator tag {actuator!r} cannot be part of a file name; '
+                'use letters, digits, "_" and "-"'
+            )
         if set(reference) & set(',\n\r'):
             raise ValueError(f'reference {reference!r} must not contain a comma or a line break')
         self.path = Path(folder) / f'{actuator}.trend.csv'

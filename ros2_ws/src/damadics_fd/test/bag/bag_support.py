@@ -34,8 +34,10 @@ def simulated(n: int = 4000) -> dict[str, np.ndarray]:
     t = np.arange(n) * 2_500_000
     rng = np.random.default_rng(1)
     return {
-        'stamp': t + 5_999_999_999, **{name: rng.random(n) for name in SIGNALS},
-        'fault': np.where(t > 3_000_000_000, 4, 0), 'strength': rng.random(n),
+        'stamp': t + 5_999_999_999,
+        **{name: rng.random(n) for name in SIGNALS},
+        'fault': np.where(t > 3_000_000_000, 4, 0),
+        'strength': rng.random(n),
     }
 
 
@@ -44,11 +46,16 @@ def stroke(n: int = 12_000, rate: float = 400.0) -> dict[str, np.ndarray]:
     t = np.arange(1, n + 1) / rate
     x1 = np.clip((t - 2.0) * 0.05, 0.0, 1.0)
     x1[t >= 20.0] += 0.01
-    columns = {name: np.full(n, value) for name, value in
-               {'p1': 3.5e6, 'p2': 2.6e6, 't1': 20.0, 'flow': 8.0, 'ps': 1e5}.items()}
+    columns = {
+        name: np.full(n, value)
+        for name, value in {'p1': 3.5e6, 'p2': 2.6e6, 't1': 20.0, 'flow': 8.0, 'ps': 1e5}.items()
+    }
     return columns | {
-        'stamp': np.round(t * 1e9).astype(np.int64), 'cv': np.ones(n), 'x1': x1,
-        'fault': np.where(t >= 20.0, 4, 0), 'strength': np.where(t >= 20.0, 1.0, 0.0),
+        'stamp': np.round(t * 1e9).astype(np.int64),
+        'cv': np.ones(n),
+        'x1': x1,
+        'fault': np.where(t >= 20.0, 4, 0),
+        'strength': np.where(t >= 20.0, 1.0, 0.0),
     }
 
 

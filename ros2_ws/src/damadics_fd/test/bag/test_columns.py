@@ -124,11 +124,14 @@ def test_arrays_become_rows_and_narrow_numbers_keep_their_type(tmp_path):
     schema = b'uint8 a\nint16 b\nfloat32[2] c\nfloat64[3] d\nbuiltin_interfaces/Time t\n' + (
         b'=' * 80 + b'\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n'
     )
-    kind = np.dtype({
-        'names': ['head', 'a', 'b', 'c', 'd', 'sec', 'ns'],
-        'formats': ['<u4', 'u1', '<i2', ('<f4', 2), ('<f8', 3), '<i4', '<u4'],
-        'offsets': [0, 4, 6, 8, 20, 44, 48], 'itemsize': 52,
-    })
+    kind = np.dtype(
+        {
+            'names': ['head', 'a', 'b', 'c', 'd', 'sec', 'ns'],
+            'formats': ['<u4', 'u1', '<i2', ('<f4', 2), ('<f8', 3), '<i4', '<u4'],
+            'offsets': [0, 4, 6, 8, 20, 44, 48],
+            'itemsize': 52,
+        }
+    )
     data = np.zeros(5, kind)
     data['head'] = 0x100
     data['a'], data['b'] = 200 + np.arange(5), -np.arange(5)
@@ -170,10 +173,15 @@ def test_a_file_compressed_as_a_whole_is_read(tmp_path):
     assert (read_columns(tmp_path / 'b.mcap.zstd')['x1'] == columns['x1']).all()
 
 
-@pytest.mark.parametrize(('content', 'reason'), [
-    (b'', 'is empty'), (b'SQLite format 3\0', 'convert it'), (b'#ROSBAG V2.0\n', 'ROS 1 bag'),
-    (b'hello, world', 'does not start as an MCAP file'),
-])
+@pytest.mark.parametrize(
+    ('content', 'reason'),
+    [
+        (b'', 'is empty'),
+        (b'SQLite format 3\0', 'convert it'),
+        (b'#ROSBAG V2.0\n', 'ROS 1 bag'),
+        (b'hello, world', 'does not start as an MCAP file'),
+    ],
+)
 def test_what_is_no_mcap_file_is_named(tmp_path, content, reason):
     (tmp_path / 'a.mcap').write_bytes(content)
     with pytest.raises(BagError, match=reason):

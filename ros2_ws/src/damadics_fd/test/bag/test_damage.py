@@ -20,12 +20,26 @@ from damadics_fd.bag.salvage import salvage
 from damadics_fd.commands.recover import main as recover
 from damadics_fd.commands.verify import main as verify
 
-SCHEMA = b'std_msgs/Header header\nfloat64 x1\n' + b'=' * 80 + (
-    b'\nMSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n' + b'=' * 80
-    + b'\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n'
+SCHEMA = (
+    b'std_msgs/Header header\nfloat64 x1\n'
+    + b'=' * 80
+    + (
+        b'\nMSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n'
+        + b'=' * 80
+        + b'\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n'
+    )
 )
-KIND = np.dtype([('cdr', '<u4'), ('sec', '<i4'), ('ns', '<u4'), ('len', '<u4'), ('tag', 'S1'),
-                 ('pad', 'V7'), ('x1', '<f8')])
+KIND = np.dtype(
+    [
+        ('cdr', '<u4'),
+        ('sec', '<i4'),
+        ('ns', '<u4'),
+        ('len', '<u4'),
+        ('tag', 'S1'),
+        ('pad', 'V7'),
+        ('x1', '<f8'),
+    ]
+)
 CHUNKS, ROWS = 4, 5
 
 
@@ -104,16 +118,16 @@ def corrupted(data: bytes, rng: random.Random) -> bytes:
     at = rng.randrange(len(data))
     size = rng.choice((1, 2, 8, 100))
     if kind == 0:
-        return data[:at] + bytes([data[at] ^ (1 << rng.randrange(8))]) + data[at + 1:]
+        return data[:at] + bytes([data[at] ^ (1 << rng.randrange(8))]) + data[at + 1 :]
     if kind == 1:
-        return data[:at] + rng.randbytes(size) + data[at + size:]
+        return data[:at] + rng.randbytes(size) + data[at + size :]
     if kind == 2:
-        return data[:at] + data[at + size:]
+        return data[:at] + data[at + size :]
     if kind == 3:
         return data[:at] + rng.randbytes(size) + data[at:]
     if kind == 4:
-        return data[:at] + bytes(size) + data[at + size:]
-    return data[:at] + b'\xff' * 8 + data[at + 8:]
+        return data[:at] + bytes(size) + data[at + size :]
+    return data[:at] + b'\xff' * 8 + data[at + 8 :]
 
 
 def intact(data: bytes, whole: bytes, ends: list[int], starts: list[int]) -> set[int]:
@@ -121,7 +135,8 @@ def intact(data: bytes, whole: bytes, ends: list[int], starts: list[int]) -> set
     return {
         chunk * ROWS + i
         for chunk, (start, end) in enumerate(zip(starts, ends, strict=True))
-        if whole[start:end] in data for i in range(ROWS)
+        if whole[start:end] in data
+        for i in range(ROWS)
     }
 
 
@@ -167,8 +182,13 @@ def test_ten_thousand_random_corruptions(tmp_path):
 
 
 def hostile_chunk(size: int, packed: bytes, compression: str = 'zstd') -> bytes:
-    return record(Op.CHUNK, CHUNK.pack(0, 0, size, 0), string(compression),
-                  struct.pack('<Q', len(packed)), packed)
+    return record(
+        Op.CHUNK,
+        CHUNK.pack(0, 0, size, 0),
+        string(compression),
+        struct.pack('<Q', len(packed)),
+        packed,
+    )
 
 
 HOSTILE = {
@@ -182,8 +202,14 @@ HOSTILE = {
     'zeros': lambda: bytes(1 << 20),
     'record heads': lambda: struct.pack('<BQ', Op.MESSAGE_INDEX, 100) * 50_000,
     'many channels': lambda: b''.join(
-        record(Op.CHANNEL, struct.pack('<HH', i % 65536, 1), string(f'/t{i}'), string('cdr'),
-               struct.pack('<I', 0)) for i in range(20_000)
+        record(
+            Op.CHANNEL,
+            struct.pack('<HH', i % 65536, 1),
+            string(f'/t{i}'),
+            string('cdr'),
+            struct.pack('<I', 0),
+        )
+        for i in range(20_000)
     ),
 }
 

@@ -83,8 +83,14 @@ def node(tmp_path):
         env['NODE_PATH'] = str(tmp_path / 'node_modules')
 
     def run(*arguments):
-        return subprocess.run([program, *map(str, arguments)], env=env, check=True,
-                              capture_output=True, text=True, timeout=100).stdout
+        return subprocess.run(
+            [program, *map(str, arguments)],
+            env=env,
+            check=True,
+            capture_output=True,
+            text=True,
+            timeout=100,
+        ).stdout
 
     return run
 
@@ -123,11 +129,17 @@ def test_bags_of_rosbags_and_mcap_ros2_support_are_replayed(tmp_path):
     definition = schema_text(MEASUREMENT)
     store.register(typesys.get_types_from_msg(definition.split('=' * 80)[0], MEASUREMENT))
     types = store.types
-    rows = list(zip(columns['stamp'].tolist(), *(columns[n].tolist() for n in (*SIGNALS, 'ps')),
-                    strict=True))
+    rows = list(
+        zip(
+            columns['stamp'].tolist(),
+            *(columns[n].tolist() for n in (*SIGNALS, 'ps')),
+            strict=True,
+        )
+    )
 
-    with rosbag2.Writer(tmp_path / 'rosbags', version=9,
-                        storage_plugin=rosbag2.StoragePlugin.MCAP) as writer:
+    with rosbag2.Writer(
+        tmp_path / 'rosbags', version=9, storage_plugin=rosbag2.StoragePlugin.MCAP
+    ) as writer:
         connection = writer.add_connection('/measurement', MEASUREMENT, typestore=store)
         for stamp, *values in rows:
             time = types['builtin_interfaces/msg/Time'](stamp // 10**9, stamp % 10**9)
@@ -159,8 +171,12 @@ def test_files_of_the_python_mcap_writer_are_read_in_any_form(tmp_path, compress
     if compression == 'LZ4':
         pytest.importorskip('lz4')
     with (tmp_path / 'a.mcap').open('wb') as stream:
-        writer = mcap.Writer(stream, chunk_size=1000, use_chunking=chunked,
-                             compression=mcap.CompressionType[compression])
+        writer = mcap.Writer(
+            stream,
+            chunk_size=1000,
+            use_chunking=chunked,
+            compression=mcap.CompressionType[compression],
+        )
         writer.start('ros2')
         schema = writer.register_schema('std_msgs/msg/Float64', 'ros2msg', b'float64 data')
         channel = writer.register_channel('/a', 'cdr', schema)

@@ -49,8 +49,13 @@ class Graph:
 
     def record(self, *args: object) -> subprocess.Popen:
         command = [sys.executable, '-m', 'damadics_fd.commands.record', *map(str, args)]
-        process = subprocess.Popen(command, env=self.environment, stdout=subprocess.PIPE,
-                                   stderr=subprocess.PIPE, text=True)
+        process = subprocess.Popen(
+            command,
+            env=self.environment,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
         self.processes.append(process)
         deadline = time.monotonic() + 30
         wanted = [self.measurement, self.residual]
@@ -208,7 +213,8 @@ def test_named_topics_are_recorded_alone_and_split(graph, tmp_path):
     report = inspect(tmp_path / 'bag')
     assert report.code == WHOLE
     assert {name: topic.count for name, topic in report.topics.items()} == {
-        '/measurement': 2500, '/residual': 2500
+        '/measurement': 2500,
+        '/residual': 2500,
     }
 
 
@@ -236,7 +242,9 @@ def test_errors_before_the_start_are_one_line(tmp_path):
     (tmp_path / 'bag' / 'file').write_text('x')
     result = subprocess.run(
         [sys.executable, '-m', 'damadics_fd.commands.record', '--out', str(tmp_path / 'bag')],
-        capture_output=True, text=True, timeout=60,
+        capture_output=True,
+        text=True,
+        timeout=60,
     )
     assert result.returncode == 1
     assert result.stderr.strip().endswith('give the bag another name')

@@ -35,7 +35,7 @@ class Disk:
     def write(self, descriptor: int, data: bytes) -> int:
         if self.free <= 0:
             raise OSError(errno.ENOSPC, 'No space left on device')
-        part = data[:max(1, min(len(data), self.free))]
+        part = data[: max(1, min(len(data), self.free))]
         self.free -= len(part)
         return self._write(descriptor, part)
 

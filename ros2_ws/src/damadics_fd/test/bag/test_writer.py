@@ -132,9 +132,17 @@ def test_a_type_that_is_not_installed_is_refused(tmp_path):
 def test_layouts_follow_the_alignment_of_cdr():
     definition = parse_definition('a/msg/B', 'uint8 a\nfloat64 b\nstring c\nint16[3] d\nbool[] e')
     data = (
-        b'\0\1\0\0' + b'\7' + bytes(7) + np.float64(2.5).tobytes()
-        + b'\3\0\0\0' + b'hi\0' + bytes(1) + np.int16([1, 2, 3]).tobytes() + bytes(2)
-        + b'\2\0\0\0' + b'\1\0'
+        b'\0\1\0\0'
+        + b'\7'
+        + bytes(7)
+        + np.float64(2.5).tobytes()
+        + b'\3\0\0\0'
+        + b'hi\0'
+        + bytes(1)
+        + np.int16([1, 2, 3]).tobytes()
+        + bytes(2)
+        + b'\2\0\0\0'
+        + b'\1\0'
     )
     layout = layout_of(definition, 'a/msg/B', data)
     message = np.frombuffer(data, layout.dtype())[0]

@@ -63,16 +63,19 @@ def test_limit_of_a_known_distribution():
     assert hits == pytest.approx(1e-3, rel=0.4)
 
 
-@pytest.mark.parametrize(('change', 'reason'), [
-    (lambda c: c.update(x1=100 * c['x1']), 'x1 reaches .* percent'),
-    (lambda c: c.update(cv=100 * c['cv']), 'cv reaches .* percent'),
-    (lambda c: c.update(p1=1e-6 * c['p1'], p2=1e-6 * c['p2']), 'p1 .* MPa.*p2 .* MPa'),
-    (lambda c: c.update(ps=1e-5 * c['ps']), 'ps reaches only .* bar'),
-    (lambda c: c.pop('ps'), 'ps is not measured'),
-    (lambda c: c.update(cv=1 - c['cv']), 'x1 falls when cv rises'),
-    (lambda c: c.update(x1=1 - c['x1'], cv=1 - c['cv']), 'x1 falls when ps rises'),
-    (lambda c: c.update(x1=0.5 + 0.1 * (c['x1'] - 0.5)), 'moves only'),
-])
+@pytest.mark.parametrize(
+    ('change', 'reason'),
+    [
+        (lambda c: c.update(x1=100 * c['x1']), 'x1 reaches .* percent'),
+        (lambda c: c.update(cv=100 * c['cv']), 'cv reaches .* percent'),
+        (lambda c: c.update(p1=1e-6 * c['p1'], p2=1e-6 * c['p2']), 'p1 .* MPa.*p2 .* MPa'),
+        (lambda c: c.update(ps=1e-5 * c['ps']), 'ps reaches only .* bar'),
+        (lambda c: c.pop('ps'), 'ps is not measured'),
+        (lambda c: c.update(cv=1 - c['cv']), 'x1 falls when cv rises'),
+        (lambda c: c.update(x1=1 - c['x1'], cv=1 - c['cv']), 'x1 falls when ps rises'),
+        (lambda c: c.update(x1=0.5 + 0.1 * (c['x1'] - 0.5)), 'moves only'),
+    ],
+)
 def test_wrong_units_and_directions_are_refused(recording, change, reason):
     columns = dict(recording)
     change(columns)
@@ -84,11 +87,26 @@ def test_command_writes_settings_plot_and_reference(tmp_path, recording, capsys)
     names = ('cv', 'x1', 'p1', 'p2', 't1', 'flow', 'ps')
     table = np.column_stack([recording['stamp'] * 1e-9] + [recording[n] for n in names])
     file = tmp_path / 'valve.csv'
-    np.savetxt(file, table, delimiter=',', header='t,' + ','.join(names), comments='',
-               fmt='%.12g')
+    np.savetxt(file, table, delimiter=',', header='t,' + ','.join(names), comments='', fmt='%.12g')
     out, plot = tmp_path / 'lv101.yaml', tmp_path / 'lv101.png'
-    assert main([str(file), '--out', str(out), '--plot', str(plot), '--reference',
-                 str(tmp_path / 'LV-101'), '--actuator', 'LV-101', '--days', '7']) == 0
+    assert (
+        main(
+            [
+                str(file),
+                '--out',
+                str(out),
+                '--plot',
+                str(plot),
+                '--reference',
+                str(tmp_path / 'LV-101'),
+                '--actuator',
+                'LV-101',
+                '--days',
+                '7',
+            ]
+        )
+        == 0
+    )
     text = capsys.readouterr().out
     assert 'K = 7' in text
     assert 'once in 7 days' in text

@@ -11,6 +11,7 @@ import pytest
 from damadics_fd.bag import BagError, BagWriter, read_columns, write_columns
 from damadics_fd.bag.recording import Recording, find_recordings, parse_maps
 from damadics_fd.bag.tables import LUBLIN
+from damadics_fd.commands.replay import output
 from damadics_fd.commands.replay.replay import main, unique_stems
 from damadics_fd.core.pipeline import run
 from damadics_fd.core.settings import Settings
@@ -45,12 +46,19 @@ def test_bag_table_and_mapped_topics_give_the_same_detections(tmp_path):
     with BagWriter(tmp_path / 'mapped') as bag:
         for name in ('cv', 'x1'):
             bag.add_topic(f'/valve/{name}', 'damadics_msgs/msg/Float64Stamped')
-            bag.write_columns(columns['stamp'], {f'/valve/{name}': {'data': columns[name] * 100}},
-                              'V')
+            bag.write_columns(
+                columns['stamp'], {f'/valve/{name}': {'data': columns[name] * 100}}, 'V'
+            )
     results = [
-        replayed(tmp_path / 'a.mcap'), replayed(tmp_path / 'a.csv'),
-        replayed(tmp_path / 'mapped', '--map', 'cv=/valve/cv.data*0.01', '--map',
-                 'x1=/valve/x1.data*0.01'),
+        replayed(tmp_path / 'a.mcap'),
+        replayed(tmp_path / 'a.csv'),
+        replayed(
+            tmp_path / 'mapped',
+            '--map',
+            'cv=/valve/cv.data*0.01',
+            '--map',
+            'x1=/valve/x1.data*0.01',
+        ),
     ]
     detections = [[(d['t'], d['residual']) for d in bag['detections']] for (bag,) in results]
     assert detections[0] == detections[1]
@@ -121,9 +129,13 @@ def test_daily_files_hold_three_actuators(tmp_path):
     assert columns['x1'].tolist() == pytest.approx((rows[:, 28] / 100).tolist())
 
 
-@pytest.mark.parametrize('name', [
-    'lublin_actuator3_20min_1hz.csv', 'simulink_dgen_nominal_900s.csv',
-])
+@pytest.mark.parametrize(
+    'name',
+    [
+        'lublin_actuator3_20min_1hz.csv',
+        'simulink_dgen_nominal_900s.csv',
+    ],
+)
 def test_shared_recordings_are_replayed(name, tmp_path):
     if not (SHARED / name).exists():
         pytest.skip(f'{name} is not there: it carries no redistribution licence')
@@ -155,14 +167,16 @@ def test_every_format_tells_the_same(tmp_path):
     for detection, line, row in zip(result['detections'], lines, rows, strict=True):
         assert detection.items() <= row.items()
         assert (row['bag'], row['mode'], row['samples']) == (result['bag'], 'paper', 12_000)
-        assert {name: '' if value is None else str(value) for name, value in row.items()
-                if name != 'samples_per_s'} == {
-            name: value for name, value in line.items() if name != 'samples_per_s'}
+        assert {
+            name: '' if value is None else str(value)
+            for name, value in row.items()
+            if name != 'samples_per_s'
+        } == {name: value for name, value in line.items() if name != 'samples_per_s'}
 
 
 @needs_messages
 def test_parquet_without_its_library_is_refused_at_once(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(replay_output, 'find_spec', lambda name: None)
+    monkeypatch.setattr(output, 'find_spec', lambda name: None)
     write_columns(tmp_path / 'a.mcap', stroke(2000))
     out = tmp_path / 'a.parquet'
     assert main([str(tmp_path / 'a.mcap'), '--mode', 'paper', '--out', str(out)]) == 1
@@ -172,7 +186,8 @@ def test_parquet_without_its_library_is_refused_at_once(tmp_path, capsys, monkey
 
 def test_maps_name_signal_source_and_factor():
     assert parse_maps(['x1=/a/b.c.d*1e-2', 'cv=CV']) == {
-        'x1': ('/a/b.c.d', 0.01), 'cv': ('CV', 1.0)
+        'x1': ('/a/b.c.d', 0.01),
+        'cv': ('CV', 1.0),
     }
     with pytest.raises(BagError, match='SIGNAL is one of'):
         parse_maps(['speed=/a.b'])

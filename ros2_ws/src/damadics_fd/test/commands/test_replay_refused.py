@@ -16,14 +16,17 @@ from damadics_fd.commands.replay.replay import main
 from ..bag.bag_support import as_csv, needs_messages, replayed, stroke
 
 
-@pytest.mark.parametrize(('args', 'reason'), [
-    (['nowhere.mcap'], 'does not exist'),
-    (['x.csv'], 'lacks a time, a control value or a position'),
-    (['x.csv', '--out', 'x.xls'], 'the suffix must be one of'),
-    (['x.csv', '--map', 'cv'], 'write SIGNAL='),
-    (['x.csv', '--map', 'cv=none'], 'there is no such column'),
-    (['x.csv', '--set', 'k1=-1', '--set', 'bogus=2'], r'bogus: no such setting.*k1 = -1'),
-])
+@pytest.mark.parametrize(
+    ('args', 'reason'),
+    [
+        (['nowhere.mcap'], 'does not exist'),
+        (['x.csv'], 'lacks a time, a control value or a position'),
+        (['x.csv', '--out', 'x.xls'], 'the suffix must be one of'),
+        (['x.csv', '--map', 'cv'], 'write SIGNAL='),
+        (['x.csv', '--map', 'cv=none'], 'there is no such column'),
+        (['x.csv', '--set', 'k1=-1', '--set', 'bogus=2'], r'bogus: no such setting.*k1 = -1'),
+    ],
+)
 def test_errors_are_one_line_on_stderr(args, reason, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path('x.csv').write_text('a,b\n1,2\n')
@@ -34,13 +37,16 @@ def test_errors_are_one_line_on_stderr(args, reason, tmp_path, capsys, monkeypat
     assert re.search(reason, error)
 
 
-@pytest.mark.parametrize(('content', 'reason'), [
-    (None, 'holds no .mcap file; give a bag, or a folder of bags'),
-    (b'PK\x03\x04 and so on', 'is a ZIP archive; unpack it first'),
-    (b'\x1f\x8b and so on', 'is compressed by gzip; unpack it first'),
-    (b'', 'is empty'),
-    (b'something else altogether', 'does not start as an MCAP file, and nothing in it can be'),
-])
+@pytest.mark.parametrize(
+    ('content', 'reason'),
+    [
+        (None, 'holds no .mcap file; give a bag, or a folder of bags'),
+        (b'PK\x03\x04 and so on', 'is a ZIP archive; unpack it first'),
+        (b'\x1f\x8b and so on', 'is compressed by gzip; unpack it first'),
+        (b'', 'is empty'),
+        (b'something else altogether', 'does not start as an MCAP file, and nothing in it can be'),
+    ],
+)
 def test_what_is_no_recording_is_told_so(content, reason, tmp_path, capsys):
     path = tmp_path / 'a.mcap'
     if content is None:
@@ -55,10 +61,16 @@ def test_what_is_no_recording_is_told_so(content, reason, tmp_path, capsys):
     assert error.count('\n') == 1
 
 
-@pytest.mark.parametrize('args', [
-    ['--live', '--out', 'a.json'], ['--live', '--bag'], ['--rate', '2'], ['--inputs-only'],
-    ['--live', '--rate', 'nan'],
-])
+@pytest.mark.parametrize(
+    'args',
+    [
+        ['--live', '--out', 'a.json'],
+        ['--live', '--bag'],
+        ['--rate', '2'],
+        ['--inputs-only'],
+        ['--live', '--rate', 'nan'],
+    ],
+)
 def test_options_that_do_not_go_together_are_refused(args):
     with pytest.raises(SystemExit) as ended:
         main(['a.mcap', *args])
@@ -126,7 +138,9 @@ def test_the_rest_of_a_folder_is_replayed_all_the_same(tmp_path, capsys):
     good, *bad = json.loads(out.read_text())
     assert (good['samples'], good['error']) == (2000, '')
     assert [text['error'].split(': ')[1] for text in bad] == [
-        'is a ZIP archive; unpack it first', 'does not exist']
+        'is a ZIP archive; unpack it first',
+        'does not exist',
+    ]
 
 
 def test_cells_of_spreadsheets_are_understood_and_cut_lines_left_out(tmp_path, capsys):
@@ -140,8 +154,10 @@ def test_cells_of_spreadsheets_are_understood_and_cut_lines_left_out(tmp_path, c
     (result,) = replayed(tmp_path / 'spelled.csv')
     assert result['samples'] == 3999
     assert result['refused'] == {'not_finite': 1}
-    assert "1 lines are no rows of numbers and are left out, first line 4001: '9,9;0,'" in (
-        result['problems'][0])
+    assert (
+        "1 lines are no rows of numbers and are left out, first line 4001: '9,9;0,'"
+        in (result['problems'][0])
+    )
     assert result['detections'][0]['t'] == expected['detections'][0]['t']
     dates = tmp_path / 'dates.csv'
     dates.write_text('t,cv,x1\n2026-11-22 09:00:00,0.1,0.2\n2026-11-22 09:00:01,0.1,0.2\n')

@@ -5,12 +5,23 @@
 import numpy as np
 
 KL = 60892.0 * 0.0381
-TABLE = ([0, .1, .2, .3, .4, .5, .6, .7, .8, .9, .99, 1.0],
-         [1.0, .95, .90, .85, .785, .725, .67, .61, .555, .50, .45, .40])
+TABLE = (
+    [0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.99, 1.0],
+    [1.0, 0.95, 0.90, 0.85, 0.785, 0.725, 0.67, 0.61, 0.555, 0.50, 0.45, 0.40],
+)
 
 
-def valve(seconds=120.0, rate=200.0, friction=0.011, stiffness=1.0, noise=0.0, seed=0, motion=None,
-          stamps=None, first=0.0):
+def valve(
+    seconds=120.0,
+    rate=200.0,
+    friction=0.011,
+    stiffness=1.0,
+    noise=0.0,
+    seed=0,
+    motion=None,
+    stamps=None,
+    first=0.0,
+):
     """
     Return columns of a valve with Coulomb and viscous friction and no mass.
 
@@ -28,8 +39,12 @@ def valve(seconds=120.0, rate=200.0, friction=0.011, stiffness=1.0, noise=0.0, s
     u = k * (x + 0.25) + 750.0 / 30446.0 * v + f * np.tanh(v / 0.002)
     rng = np.random.default_rng(seed)
     return {
-        'stamp': np.round(t * 1e9).astype(np.int64), 'cv': np.clip(x, 0, 1),
-        'x1': x + noise * rng.standard_normal(len(t)), 'p1': p1, 'p2': p2,
-        't1': np.full(len(t), 20.0), 'flow': np.full(len(t), 8.0),
+        'stamp': np.round(t * 1e9).astype(np.int64),
+        'cv': np.clip(x, 0, 1),
+        'x1': x + noise * rng.standard_normal(len(t)),
+        'p1': p1,
+        'p2': p2,
+        't1': np.full(len(t), 20.0),
+        'flow': np.full(len(t), 8.0),
         'ps': (u * KL - 2 * 9.81 + plug) / 0.029,
     }

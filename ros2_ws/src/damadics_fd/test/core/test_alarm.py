@@ -47,9 +47,26 @@ class Valve:
         for _ in range(max(1, round(seconds * 1e9 / TICK))):
             self.stamp += TICK
             xi2 = ratio * self.settings.rho_min
-            decision = self.detector.update(Estimate(
-                self.stamp, 0.0, x + 0.25, 0.0, 0.0, xi2, 0.0, 750.0, 30446.0, 30446.0, x, 0.5,
-                2e5, 9e5, 1.0, phase))
+            decision = self.detector.update(
+                Estimate(
+                    self.stamp,
+                    0.0,
+                    x + 0.25,
+                    0.0,
+                    0.0,
+                    xi2,
+                    0.0,
+                    750.0,
+                    30446.0,
+                    30446.0,
+                    x,
+                    0.5,
+                    2e5,
+                    9e5,
+                    1.0,
+                    phase,
+                )
+            )
             self.events += decision.events
         return decision
 
@@ -170,11 +187,17 @@ def test_alarm_survives_a_restart():  # AM-7
     assert again.feed(0.1) == valve.feed(0.1)
 
 
-@pytest.mark.parametrize('damage', [
-    lambda s: s.pop('active'), lambda s: s.update(active_since=1), lambda s: s.update(peak='x'),
-    lambda s: s.update(peak=math.inf), lambda s: s.update(recent=[1, 2]),
-    lambda s: s.update(occurrence=2**70),
-])
+@pytest.mark.parametrize(
+    'damage',
+    [
+        lambda s: s.pop('active'),
+        lambda s: s.update(active_since=1),
+        lambda s: s.update(peak='x'),
+        lambda s: s.update(peak=math.inf),
+        lambda s: s.update(recent=[1, 2]),
+        lambda s: s.update(occurrence=2**70),
+    ],
+)
 def test_damaged_alarm_state_is_refused_whole(damage):
     valve = Valve()
     valve.feed(1.7, 1.0)
@@ -247,11 +270,22 @@ class AlarmMachine(RuleBasedStateMachine):
                 self.active_before = False
             elif event.transition == RESET:
                 assert not self.active_before  # never reset while active
-            assert event.transition in (RAISED, CLEARED, ACKNOWLEDGED, RESET, SHELVED, UNSHELVED,
-                                        NEAR_MISS, CHANGED)
+            assert event.transition in (
+                RAISED,
+                CLEARED,
+                ACKNOWLEDGED,
+                RESET,
+                SHELVED,
+                UNSHELVED,
+                NEAR_MISS,
+                CHANGED,
+            )
 
-    @rule(ratio=st.sampled_from([0.0, 0.9, 1.1, 2.0, 9.0]), n=st.integers(1, 40),
-          phase=st.sampled_from([PHASE_MONITOR] * 4 + [PHASE_HOLD, PHASE_LEARN_PHI]))
+    @rule(
+        ratio=st.sampled_from([0.0, 0.9, 1.1, 2.0, 9.0]),
+        n=st.integers(1, 40),
+        phase=st.sampled_from([PHASE_MONITOR] * 4 + [PHASE_HOLD, PHASE_LEARN_PHI]),
+    )
     def sample(self, ratio, n, phase):
         for _ in range(n):
             was = self.valve.detector.decision
@@ -265,8 +299,9 @@ class AlarmMachine(RuleBasedStateMachine):
     @rule()
     def acknowledge(self):
         outcome = self.valve.detector.acknowledge()
-        assert outcome.done == (self.valve.detector.state['active'][0]
-                                or self.valve.detector.state['latched'][0])
+        assert outcome.done == (
+            self.valve.detector.state['active'][0] or self.valve.detector.state['latched'][0]
+        )
         self.note(outcome.events)
 
     @rule()

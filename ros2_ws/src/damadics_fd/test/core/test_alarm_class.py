@@ -62,7 +62,7 @@ def test_the_table_of_the_user_decides():
 
 def test_a_shelved_alarm_is_a_function_check_whatever_its_cause():
     valve = alarmed(SPRING, -0.3)
-    event, = valve.detector.shelve(60.0).events
+    (event,) = valve.detector.shelve(60.0).events
     assert event.transition == SHELVED
     assert explain(event, load_causes(), 'V').level == FUNCTION_CHECK
     assert valve.feed(1.2, 1.0).level == FUNCTION_CHECK
@@ -75,14 +75,20 @@ def slow_wear() -> Result:
     from damadics_plant import Fault, LuGreActuator, Scenario, simulate
     from damadics_plant.sources import RandomSteps, Sine
 
-    scenario = Scenario('wear', 2400.0, cv=RandomSteps(seed=6),
-                        faults=(Fault('f4', 0.6, 300.0, 3600.0, direction=-1),),
-                        p1=Sine(3.5e6, 175e3, 0.1), p2=Sine(2.6e6, 26e3, 0.32))
+    scenario = Scenario(
+        'wear',
+        2400.0,
+        cv=RandomSteps(seed=6),
+        faults=(Fault('f4', 0.6, 300.0, 3600.0, direction=-1),),
+        p1=Sine(3.5e6, 175e3, 0.1),
+        p2=Sine(2.6e6, 26e3, 0.32),
+    )
     settings = Settings.for_mode('monitor', t_learn=60.0, rho_min=3.0)
     columns = simulate(scenario, 200.0, LuGreActuator(), noise='cv', seed=5)
     rng = np.random.default_rng(5)
     columns = dict(columns) | {
-        'x1': columns['x1'] + 1.4e-3 * rng.standard_normal(len(columns['x1']))}
+        'x1': columns['x1'] + 1.4e-3 * rng.standard_normal(len(columns['x1']))
+    }
     return run(columns, settings, detector=Detector(settings, load_causes().classes))
 
 

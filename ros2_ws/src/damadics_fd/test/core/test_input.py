@@ -41,9 +41,15 @@ def without(columns, rows):
     return {name: column[keep] for name, column in columns.items()}
 
 
-BAD = {'cv': [math.nan, math.inf, -0.2, 1.3], 'x1': [math.nan, -math.inf, 1.5, 1e300],
-       'p1': [math.nan, 1e12], 'p2': [math.inf, -1e6], 'ps': [math.nan, 5e6],
-       't1': [math.inf], 'flow': [-math.inf]}
+BAD = {
+    'cv': [math.nan, math.inf, -0.2, 1.3],
+    'x1': [math.nan, -math.inf, 1.5, 1e300],
+    'p1': [math.nan, 1e12],
+    'p2': [math.inf, -1e6],
+    'ps': [math.nan, 5e6],
+    't1': [math.inf],
+    'flow': [-math.inf],
+}
 
 
 @pytest.mark.parametrize('signal', BAD)
@@ -140,8 +146,9 @@ def test_dropped_samples_leave_the_residual_consistent(share):  # TI-1
 def test_jitter_raises_no_alarm():  # TI-7
     rng = np.random.default_rng(5)
     t = (np.arange(24000) + rng.uniform(-0.49, 0.49, 24000)) * 0.005 + 0.005
-    fault = run(valve(stamps=t, noise=1e-3, friction=lambda s: 0.011 * (1 + 4 * (s > 90))),
-                SETTINGS)
+    fault = run(
+        valve(stamps=t, noise=1e-3, friction=lambda s: 0.011 * (1 + 4 * (s > 90))), SETTINGS
+    )
     assert len(fault.detections) == 1
     assert fault.detections[0].stamp * 1e-9 == pytest.approx(90.1, abs=0.2)
 
@@ -149,8 +156,14 @@ def test_jitter_raises_no_alarm():  # TI-7
 def test_one_sample_per_second_stays_finite():  # TI-8
     n = 20000
     rng = np.random.default_rng(0)
-    columns = {'stamp': np.arange(n) * 1_000_000_000, 'cv': rng.random(n), 'x1': rng.random(n),
-               'p1': 4e6 * rng.random(n), 'p2': 4e6 * rng.random(n), 'ps': 3e5 * rng.random(n)}
+    columns = {
+        'stamp': np.arange(n) * 1_000_000_000,
+        'cv': rng.random(n),
+        'x1': rng.random(n),
+        'p1': 4e6 * rng.random(n),
+        'p2': 4e6 * rng.random(n),
+        'ps': 3e5 * rng.random(n),
+    }
     result = run(columns, SETTINGS)
     assert result.counters['accepted'] == n
     for name in ('x2', 'x1_hat', 'x2_hat', 'xi1', 'xi2', 'phi'):
@@ -158,10 +171,17 @@ def test_one_sample_per_second_stays_finite():  # TI-8
 
 
 NUMBERS = st.one_of(
-    st.floats(allow_nan=True, allow_infinity=True), st.floats(0.0, 1.0), st.just(0.5),
-    st.sampled_from([0.0, 1.0, 1e300, -1e300, 1e-300, 3.5e6, 2.6e6, 1.4e5, math.nan, math.inf]))
-STEPS = st.one_of(st.just(5_000_000), st.integers(-10**10, 10**10), st.integers(0, 10),
-                  st.integers(-2**62, 2**62))
+    st.floats(allow_nan=True, allow_infinity=True),
+    st.floats(0.0, 1.0),
+    st.just(0.5),
+    st.sampled_from([0.0, 1.0, 1e300, -1e300, 1e-300, 3.5e6, 2.6e6, 1.4e5, math.nan, math.inf]),
+)
+STEPS = st.one_of(
+    st.just(5_000_000),
+    st.integers(-(10**10), 10**10),
+    st.integers(0, 10),
+    st.integers(-(2**62), 2**62),
+)
 SAMPLES = st.lists(st.tuples(STEPS, NUMBERS, NUMBERS, *[NUMBERS] * 5, st.booleans()), max_size=60)
 
 
@@ -173,10 +193,20 @@ def test_any_input_keeps_states_finite_and_weights_bounded(velocity, samples):  
     estimator, detector = Estimator(settings), Detector(settings)
     stamp = 0
     for step, cv, x1, p1, p2, t1, flow, ps, tame in samples:
-        stamp = max(-2**62, min(2**62, stamp + step))
-        sample = (0.5, abs(x1) % 1.0 if math.isfinite(x1) else 0.5, 3.5e6, 2.6e6, 20.0, 5.0,
-                  abs(ps) % 3e5 if math.isfinite(ps) else 1e5) if tame else (
-                      cv, x1, p1, p2, t1, flow, ps)
+        stamp = max(-(2**62), min(2**62, stamp + step))
+        sample = (
+            (
+                0.5,
+                abs(x1) % 1.0 if math.isfinite(x1) else 0.5,
+                3.5e6,
+                2.6e6,
+                20.0,
+                5.0,
+                abs(ps) % 3e5 if math.isfinite(ps) else 1e5,
+            )
+            if tame
+            else (cv, x1, p1, p2, t1, flow, ps)
+        )
         before = estimator.state.tobytes()
         estimate = estimator.update(stamp, *sample)
         s = estimator.state[0]
@@ -184,10 +214,23 @@ def test_any_input_keeps_states_finite_and_weights_bounded(velocity, samples):  
             assert estimator.state.tobytes() == before
             assert estimator.last_rejection
             continue
-        finite = (estimate.x2, estimate.x1_hat, estimate.x2_hat, estimate.xi1, estimate.xi2,
-                  estimate.phi, estimate.u, *estimate.alpha_hat, s.y, s.v, s.uy, s.uv, s.travel)
+        finite = (
+            estimate.x2,
+            estimate.x1_hat,
+            estimate.x2_hat,
+            estimate.xi1,
+            estimate.xi2,
+            estimate.phi,
+            estimate.u,
+            *estimate.alpha_hat,
+            s.y,
+            s.v,
+            s.uy,
+            s.uv,
+            s.travel,
+        )
         assert all(math.isfinite(v) for v in finite)
-        norm = math.sqrt(sum(float(np.sum(s[name]**2)) for name in ('w1', 'w2', 'eps1', 'b1')))
+        norm = math.sqrt(sum(float(np.sum(s[name] ** 2)) for name in ('w1', 'w2', 'eps1', 'b1')))
         assert norm <= 50.0 * (1 + 1e-12)
         assert abs(estimate.alpha5 - settings.alpha5) <= 0.3 * settings.alpha5 * (1 + 1e-12)
         decision = detector.update(estimate)
@@ -198,12 +241,29 @@ def test_any_input_keeps_states_finite_and_weights_bounded(velocity, samples):  
 
 def test_settings_list_all_errors_at_once():  # PR-5
     with pytest.raises(SettingsError) as caught:
-        Settings.from_mapping({'mode': 'monitor', 'k1': -1.0, 'k3': 5.0, 'kappa': math.nan,
-                               'decide_m': 2.5, 'latch': 1, 'plug_table': [1.0], 'wn': 'fast'})
+        Settings.from_mapping(
+            {
+                'mode': 'monitor',
+                'k1': -1.0,
+                'k3': 5.0,
+                'kappa': math.nan,
+                'decide_m': 2.5,
+                'latch': 1,
+                'plug_table': [1.0],
+                'wn': 'fast',
+            }
+        )
     assert len(caught.value.problems) == 7
     text = str(caught.value)
-    for name in ('k1 = -1.0', 'k3: no such setting', 'kappa', 'decide_m', 'latch', 'plug_table',
-                 "wn = 'fast'"):
+    for name in (
+        'k1 = -1.0',
+        'k3: no such setting',
+        'kappa',
+        'decide_m',
+        'latch',
+        'plug_table',
+        "wn = 'fast'",
+    ):
         assert name in text
     with pytest.raises(SettingsError, match='rho_min is not larger than dz'):
         Settings.for_mode('monitor', rho_min=0.05)
@@ -217,8 +277,11 @@ def test_settings_describe_themselves():
     for mode in ('paper', 'monitor'):
         rows = Settings.describe(mode)
         assert all(row['description'] and 'unit' in row for row in rows)
-        assert all(row['low'] <= row['default'] <= row['high'] for row in rows
-                   if row['type'] in (int, float))
+        assert all(
+            row['low'] <= row['default'] <= row['high']
+            for row in rows
+            if row['type'] in (int, float)
+        )
         built = Settings.from_mapping({row['name']: row['default'] for row in rows})
         assert built == Settings.for_mode(mode)
         assert Settings.from_mapping(built.to_dict()) == built

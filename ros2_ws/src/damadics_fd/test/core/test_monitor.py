@@ -77,13 +77,17 @@ def test_explicit_euler_diverges_where_the_implicit_step_does_not():
 
 def test_printed_sigmoids():
     assert sigmoids(0.0)[2] == pytest.approx(-0.70017, abs=1e-5)
-    s2 = np.array([sigmoids(0.0)[2]**n for n in range(1, 6)])
+    s2 = np.array([sigmoids(0.0)[2] ** n for n in range(1, 6)])
     assert s2 @ s2 == pytest.approx(0.934, abs=1e-3)
     for x in (-20.0, -0.6, -0.1, -0.0, 0.0, 1e-9, 0.2, 3.0):
-        printed = [m / (1.0 + np.exp(-slope * (z - center))) + shift
-                   for z, m, slope, center, shift in (
-                       (x, 1.41, -10.0225, 0.5974, -2.11), (abs(x), 1.41, -10.0225, 0.5974, -2.11),
-                       (abs(x), 0.8, -4.0, 2.119, -1.5))]
+        printed = [
+            m / (1.0 + np.exp(-slope * (z - center))) + shift
+            for z, m, slope, center, shift in (
+                (x, 1.41, -10.0225, 0.5974, -2.11),
+                (abs(x), 1.41, -10.0225, 0.5974, -2.11),
+                (abs(x), 0.8, -4.0, 2.119, -1.5),
+            )
+        ]
         assert sigmoids(x) == pytest.approx(printed, rel=1e-14)
     for x in (-1e300, 1e300):
         assert np.isfinite(sigmoids(x)).all()
@@ -135,8 +139,9 @@ def test_stem_that_does_not_move_is_not_learned():  # IN-5
     result = run(valve(100.0, motion=lambda t: 0.5 + 0.0 * t, noise=noise), SETTINGS)
     assert result.estimates['phase'][-1] == PHASE_LEARN_PHI
     assert 'insufficient excitation' in result.estimator.status
-    moving = run(valve(60.0, noise=noise, first=100.0), SETTINGS, result.estimator,
-                 result.detector)
+    moving = run(
+        valve(60.0, noise=noise, first=100.0), SETTINGS, result.estimator, result.detector
+    )
     assert moving.estimates['phase'][-1] == PHASE_MONITOR
     assert moving.detections == []
 
@@ -152,13 +157,16 @@ def test_standing_still_while_monitoring_is_said_not_alarmed():  # IN-5
     assert later.estimator.learned() == learned
 
 
-@pytest.mark.parametrize('change', [  # AL-1
-    {'friction': lambda t: 0.011 * (1 + 4 * (t > 45))},
-    {'friction': lambda t: 0.011 * (1 + 20 * np.clip((t - 30) / 20, 0, 1))},
-    {'friction': lambda t: 0.011 * (1 + 20 * np.clip((t - 30) / 300, 0, 1))},
-    {'stiffness': lambda t: 1 + 0.05 * (t > 45)},
-    {'stiffness': lambda t: 1 - 0.2 * (t > 58)},
-])
+@pytest.mark.parametrize(
+    'change',
+    [  # AL-1
+        {'friction': lambda t: 0.011 * (1 + 4 * (t > 45))},
+        {'friction': lambda t: 0.011 * (1 + 20 * np.clip((t - 30) / 20, 0, 1))},
+        {'friction': lambda t: 0.011 * (1 + 20 * np.clip((t - 30) / 300, 0, 1))},
+        {'stiffness': lambda t: 1 + 0.05 * (t > 45)},
+        {'stiffness': lambda t: 1 - 0.2 * (t > 58)},
+    ],
+)
 def test_fault_during_learning_is_refused(change):
     result = run(valve(120.0, noise=1.4e-3, **change), SETTINGS)
     assert not np.any(result.estimates['phase'] == PHASE_MONITOR)
@@ -172,8 +180,10 @@ def test_fault_seen_in_half_a_second_of_learning_is_refused():  # AL-1
     def motion(t):  # rests from 48 s to 59.4 s
         return 0.2 + 0.12 * np.abs((np.where((t > 48) & (t < 59.4), 48, t) % 10.0) - 5.0)
 
-    result = run(valve(120.0, noise=1.4e-3, motion=motion,
-                       friction=lambda t: 0.011 * (1 + 3 * (t > 50))), SETTINGS)
+    result = run(
+        valve(120.0, noise=1.4e-3, motion=motion, friction=lambda t: 0.011 * (1 + 3 * (t > 50))),
+        SETTINGS,
+    )
     assert not np.any(result.estimates['phase'] == PHASE_MONITOR)
     assert 'learning was refused' in result.estimator.status
 
@@ -187,9 +197,17 @@ def test_motion_in_one_direction_is_not_enough():
     assert not np.any(result.estimates['phase'] == PHASE_MONITOR)
     assert 'insufficient excitation' in result.estimator.status
     assert 'in one direction only' in result.estimator.status
-    later = run(valve(60.0, noise=1.4e-3, first=80.0,
-                      motion=lambda t: 0.848 - 0.06 * (10.0 - np.abs((t % 20.0) - 10.0))),
-                SETTINGS, result.estimator, result.detector)
+    later = run(
+        valve(
+            60.0,
+            noise=1.4e-3,
+            first=80.0,
+            motion=lambda t: 0.848 - 0.06 * (10.0 - np.abs((t % 20.0) - 10.0)),
+        ),
+        SETTINGS,
+        result.estimator,
+        result.detector,
+    )
     assert later.estimates['phase'][-1] == PHASE_MONITOR
     assert later.detections == []
 
@@ -211,9 +229,14 @@ def test_learning_again_compares_with_the_reference_unless_repaired():
         assert (result.estimates['phase'][-1] == PHASE_MONITOR) == after_repair
 
 
-@pytest.mark.parametrize(('name', 'changes', 'lag'), [
-    ('high_pass', {'tau': 0.02}, 0.02), ('kalman', {}, 0.027), ('super_twisting', {}, 0.01),
-])
+@pytest.mark.parametrize(
+    ('name', 'changes', 'lag'),
+    [
+        ('high_pass', {'tau': 0.02}, 0.02),
+        ('kalman', {}, 0.027),
+        ('super_twisting', {}, 0.01),
+    ],
+)
 def test_velocity_estimators_follow_a_ramp(name, changes, lag):
     settings = SETTINGS.replace(velocity=name, **changes)
     columns = valve(10.0, motion=lambda t: 0.1 + 0.05 * t)
@@ -233,11 +256,17 @@ def test_paper_mode_reproduces_the_detection_of_the_paper(scenario, at):
     assert any(t == pytest.approx(30.795) for t in times)  # listed, not hidden
 
 
-@pytest.mark.parametrize(('model', 'scenario', 'at'), [
-    ('lugre', 'paper_nominal', None), ('lugre', 'paper_friction', 71.310),
-    ('lugre', 'paper_spring', 70.020), ('dablib', 'paper_nominal', None),
-    ('dablib', 'paper_friction', 80.505), ('dablib', 'paper_spring', 70.010),
-])
+@pytest.mark.parametrize(
+    ('model', 'scenario', 'at'),
+    [
+        ('lugre', 'paper_nominal', None),
+        ('lugre', 'paper_friction', 71.310),
+        ('lugre', 'paper_spring', 70.020),
+        ('dablib', 'paper_nominal', None),
+        ('dablib', 'paper_friction', 80.505),
+        ('dablib', 'paper_spring', 70.010),
+    ],
+)
 def test_anchors_of_monitor_mode(model, scenario, at):
     result = run(simulate(scenario, rate=200.0, model=model), SETTINGS)
     times = [event.stamp * 1e-9 for event in result.detections]
@@ -250,4 +279,4 @@ def test_anchors_of_monitor_mode(model, scenario, at):
 def test_flag_persists_though_the_fault_stays():  # AL-3
     result = run(simulate('paper_spring', rate=200.0, model='lugre'), SETTINGS)
     fault = result.decisions['fault']
-    assert fault[np.flatnonzero(fault)[0]:].all()
+    assert fault[np.flatnonzero(fault)[0] :].all()

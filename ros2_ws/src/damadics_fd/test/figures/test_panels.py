@@ -31,7 +31,8 @@ def test_six_panels_are_drawn_with_and_without_the_truth(tmp_path, known):
     t = np.arange(n) / 400.0
     columns = {
         'stamp': (t * 1e9).astype(np.int64) + (0 if known else 1_700_000_000 * 10**9),
-        'cv': (t > 1).astype(float), 'x1': np.clip(t - 1, 0, 1),
+        'cv': (t > 1).astype(float),
+        'x1': np.clip(t - 1, 0, 1),
     }
     if known:
         columns |= {'fault': np.where(t > 2, 11, 0), 'strength': (t > 2).astype(float)}
@@ -42,15 +43,20 @@ def test_six_panels_are_drawn_with_and_without_the_truth(tmp_path, known):
 
 
 def test_rows_kept_for_a_picture_stay_few_and_hold_every_spike(monkeypatch):
-    monkeypatch.setattr(thinning, 'MOST_ROWS', 2000)
+    monkeypatch.setattr(decimation, 'MOST_ROWS', 2000)
     settings = Settings.for_mode('paper')
     thinner, rng, spikes, most = decimation.Thinner(), np.random.default_rng(1), [], 0
     for piece in range(600):
         rows = int(rng.integers(50, 400))
         stamp = (piece * 1000 + np.arange(rows)) * 1_000_000 + 1
         columns = {'stamp': stamp, 'cv': np.zeros(rows), 'x1': rng.random(rows)}
-        result = Result(np.zeros(rows, np.uint8), np.zeros(rows, ESTIMATE),
-                        np.zeros(rows, DECISION), Estimator(settings), Detector(settings))
+        result = Result(
+            np.zeros(rows, np.uint8),
+            np.zeros(rows, ESTIMATE),
+            np.zeros(rows, DECISION),
+            Estimator(settings),
+            Detector(settings),
+        )
         if piece % 50 == 7:
             spike = int(rng.integers(rows))
             result.estimates['xi2'][spike] = 5.0 + piece

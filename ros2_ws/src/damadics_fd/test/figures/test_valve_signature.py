@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from damadics_fd.core.signature.signature import Signature
 from damadics_fd.core.signature.state import SignatureSettings
+from damadics_fd.figures import valve_signature
 from damadics_fd.figures.valve_signature import ForceMap, force_over_position
 
 C = SignatureSettings()
@@ -28,7 +29,7 @@ def test_blocks_do_not_depend_on_the_pieces_and_hold_the_force():
     whole, pieces = ForceMap(Signature(C)), ForceMap(Signature(C))
     whole.add(data)
     for first in range(0, len(data), 777):
-        pieces.add(data[first:first + 777])
+        pieces.add(data[first : first + 777])
     for a, b in zip(whole.moving(), pieces.moving(), strict=True):
         np.testing.assert_allclose(a, b, rtol=1e-12)
     _, x, force, _, v = whole.moving()
@@ -38,10 +39,10 @@ def test_blocks_do_not_depend_on_the_pieces_and_hold_the_force():
 
 
 def test_blocks_of_long_recordings_stay_few_with_the_first_and_the_latest(monkeypatch):
-    monkeypatch.setattr(signature_figure, 'MOST_BLOCKS', 400)
+    monkeypatch.setattr(valve_signature, 'MOST_BLOCKS', 400)
     data, force_map = rows(200.0), ForceMap(Signature(C))
     for first in range(0, len(data), 777):
-        force_map.add(data[first:first + 777])
+        force_map.add(data[first : first + 777])
     t, *_ = force_map.moving()
     assert 100 < len(t) <= 400
     assert t[0] < 1.0

@@ -54,9 +54,11 @@ def test_bad_samples_are_refused_with_a_reason(columns):
     assert estimator.update(*row) is not None
     before = estimator.monitor._state.tobytes()
     for index, value, reason in (
-        (0, row[0], 'duplicate'), (2, math.nan, 'not_finite'), (3, math.nan, 'not_finite'),
+        (0, row[0], 'duplicate'),
+        (2, math.nan, 'not_finite'),
+        (3, math.nan, 'not_finite'),
         (1, 2.0, 'out_of_range'),
-    ):  # fmt: skip
+    ):
         bad = list(row)
         bad[0] = row[0] + (index != 0)
         bad[index] = value

@@ -98,7 +98,16 @@ def test_state_does_not_depend_on_how_the_time_is_cut():
     start_stem(stem[0], ACT[0], 0.0)
     for k in range(300):
         advance_stem(
-            stem[0], ACT[0], np.zeros(1, FAULTS)[0], k / 10, (k + 1) / 10, 0.6, 0.6, DROP, DROP,
-            0.0, 0.0,
-        )  # fmt: skip
+            stem[0],
+            ACT[0],
+            np.zeros(1, FAULTS)[0],
+            k / 10,
+            (k + 1) / 10,
+            0.6,
+            0.6,
+            DROP,
+            DROP,
+            0.0,
+            0.0,
+        )
     assert pytest.approx(whole.X, abs=1e-12) == stem[0].X

@@ -205,11 +205,15 @@ class Stepped:
         return np.where((t >= 1000) & (t < 1600), steps, sine)
 
 
-@pytest.mark.parametrize(('fault', 'found'), [((), None), ((('f13', 0.25, 1200.0),), 1202.0),
-                                              ((('f1', 0.75, 1400.0),), 1500.0)])
+@pytest.mark.parametrize(
+    ('fault', 'found'),
+    [((), None), ((('f13', 0.25, 1200.0),), 1202.0), ((('f1', 0.75, 1400.0),), 1500.0)],
+)
 def test_an_unlearned_step_of_cv_is_no_fault_and_hides_none_for_long(fault, found):
     scenario = dataclasses.replace(
-        load_scenario('nominal'), duration=2100.0, cv=Stepped(),
+        load_scenario('nominal'),
+        duration=2100.0,
+        cv=Stepped(),
         faults=tuple(Fault(*f) for f in fault),
     )
     run = simulate(scenario, rate=1, noise='cv', seed=5)

@@ -18,13 +18,16 @@ def test_every_cause_has_a_text_for_known_and_unknown_numbers():
         text, _ = table[name].describe('LV-101', 0.25, 0.01, 0.99, 'spring_softer')
         assert '{' not in text
     assert table['friction_up'].describe('V', 0.25, 0.01, 0.99)[0] == (
-        'V: friction up by +25% +- 2% (confidence 99%)')
+        'V: friction up by +25% +- 2% (confidence 99%)'
+    )
 
 
 def test_a_users_file_replaces_only_what_it_names(tmp_path):
     file = tmp_path / 'causes.yaml'
-    file.write_text('causes: {friction_up: {ne107: failure, advice: "Call {tag} service"}}\n'
-                    'limits: {friction: [1]}\n')
+    file.write_text(
+        'causes: {friction_up: {ne107: failure, advice: "Call {tag} service"}}\n'
+        'limits: {friction: [1]}\n'
+    )
     table, standard = load_causes(file), load_causes()
     assert table['friction_up'].ne107 == 4
     assert table['friction_up'].describe('V', 1.0, 0.1, 1.0)[1] == 'Call V service'
@@ -34,20 +37,23 @@ def test_a_users_file_replaces_only_what_it_names(tmp_path):
     assert table.limits['spring'] == standard.limits['spring']
 
 
-@pytest.mark.parametrize('content, complaints', [
-    ('causes: {friktion: {text: a}}', ['no such cause: friktion']),
-    ('causes: {supply: {ne107: bad, text: "{valve}"}}', ['ne107', '{valve}']),
-    ('causes: {supply: {text: "{value.__class__}"}}', ['unknown field']),
-    ('causes: {supply: {text: "{value:q}"}}', ['supply, text']),
-    ('causes: {supply: {text: "{value"}}', ['supply, text']),
-    ('causes: {supply: {text: 5}}', ['not a text']),
-    ('causes: {supply: {texts: a}}', ['expected some of the keys']),
-    ('causes: [supply]', ['expected names']),
-    ('limits: {spring: [0], speed: [1]}', ['limits of spring', 'no such quantity: speed']),
-    ('cause: {}', ['expected the keys']),
-    ('[1, 2]', ['expected the keys']),
-    ('causes: {', ['not valid YAML']),
-])
+@pytest.mark.parametrize(
+    'content, complaints',
+    [
+        ('causes: {friktion: {text: a}}', ['no such cause: friktion']),
+        ('causes: {supply: {ne107: bad, text: "{valve}"}}', ['ne107', '{valve}']),
+        ('causes: {supply: {text: "{value.__class__}"}}', ['unknown field']),
+        ('causes: {supply: {text: "{value:q}"}}', ['supply, text']),
+        ('causes: {supply: {text: "{value"}}', ['supply, text']),
+        ('causes: {supply: {text: 5}}', ['not a text']),
+        ('causes: {supply: {texts: a}}', ['expected some of the keys']),
+        ('causes: [supply]', ['expected names']),
+        ('limits: {spring: [0], speed: [1]}', ['limits of spring', 'no such quantity: speed']),
+        ('cause: {}', ['expected the keys']),
+        ('[1, 2]', ['expected the keys']),
+        ('causes: {', ['not valid YAML']),
+    ],
+)
 def test_a_wrong_file_is_refused_with_every_error(tmp_path, content, complaints):
     file = tmp_path / 'mine.yaml'
     file.write_text(content)
@@ -62,16 +68,31 @@ def test_an_unknown_strength_reads_unknown():
 
 
 def event(transition: int, occurrence: int = 1, cause: str = '', level: int = 1, **values):
-    return Event(transition, 2_000_000_000, occurrence, level, 1_000_000_000, 1.0, 0.5, 2.0, 1.0,
-                 cause=cause, text='raised', **values)
+    return Event(
+        transition,
+        2_000_000_000,
+        occurrence,
+        level,
+        1_000_000_000,
+        1.0,
+        0.5,
+        2.0,
+        1.0,
+        cause=cause,
+        text='raised',
+        **values,
+    )
 
 
 def test_an_event_is_worded_by_its_cause():
     table = load_causes()
     plain = event(RAISED)
     assert explain(plain, table, 'V') is plain
-    named = explain(event(CHANGED, cause='spring_softer', strength=-0.05, spread=0.001,
-                          confidence=0.99), table, 'V')
+    named = explain(
+        event(CHANGED, cause='spring_softer', strength=-0.05, spread=0.001, confidence=0.99),
+        table,
+        'V',
+    )
     assert named.text == 'V: spring softer by -5.0% +- 0.2% (confidence 99%); raised'
     assert 'crack' in named.advice
 
@@ -79,8 +100,9 @@ def test_an_event_is_worded_by_its_cause():
 def test_replay_puts_a_later_cause_into_its_detection():
     found: list[dict] = []
     collect(found, [event(RAISED, cause='undetermined')], 0)
-    collect(found, [event(CHANGED, cause='friction_up', strength=0.5, spread=0.02,
-                          confidence=0.99)], 0)
+    collect(
+        found, [event(CHANGED, cause='friction_up', strength=0.5, spread=0.02, confidence=0.99)], 0
+    )
     collect(found, [event(RAISED, 2)], 0)
     collect(found, [event(CHANGED, 1, cause='supply')], 0)
     assert [d['cause'] for d in found] == ['friction_up', '']

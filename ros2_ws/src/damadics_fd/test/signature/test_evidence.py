@@ -197,8 +197,9 @@ def test_evidence_of_growing_changes_equals_the_specification(column, growing):
         s.ph[:], s.w, s.v = phi[k], w[k], v[k]
         accumulate(s, SET_ALARM, 1.0 - 1.0 / 30.0, r[k])
     D = evaluate(s, c, SET_ALARM, 0.2, 0.0, 0.0)
-    expected, p, value, std = specification(phi, w, v, r, 1.0 - 1.0 / 30.0, theta, J0, 0.2, 0.0,
-                                            0.0, tau=0.8)
+    expected, p, value, std = specification(
+        phi, w, v, r, 1.0 - 1.0 / 30.0, theta, J0, 0.2, 0.0, 0.0, tau=0.8
+    )
     assert pytest.approx(expected, rel=1e-6) == D
     np.testing.assert_allclose(np.exp(s.logp[SET_ALARM][1:]), p, rtol=1e-5, atol=1e-9)
     np.testing.assert_allclose(s.value[SET_ALARM][1:], value, rtol=1e-6, atol=1e-9)
@@ -213,8 +214,11 @@ def test_joint_change_separates_spring_preload_and_friction():
     c = settings_record(SignatureSettings())[0]
     s = np.zeros(1, STATE_DTYPE)[0]
     s.theta[:], s.J0[:, :], s.sigma = theta, J0 * 100.0, SIGMA
-    change = 0.01 * phi[:, X1] + 0.004 * phi[:, ONE] + 0.3 * (
-        theta[SIGN] * phi[:, SIGN] + theta[V] * phi[:, V])
+    change = (
+        0.01 * phi[:, X1]
+        + 0.004 * phi[:, ONE]
+        + 0.3 * (theta[SIGN] * phi[:, SIGN] + theta[V] * phi[:, V])
+    )
     for k in range(400):
         s.ph[:], s.w, s.v = phi[k], w[k], v[k]
         accumulate(s, SET_MID, 1.0, change[k] + SIGMA * rng.standard_normal() / np.sqrt(w[k]))

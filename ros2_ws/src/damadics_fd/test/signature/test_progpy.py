@@ -21,8 +21,8 @@ from damadics_fd.core.signature.signature import SignatureView
 from ..bag.bag_support import needs_messages
 
 valve = pytest.importorskip(
-    'progpy.models.pneumatic_valve',
-    reason='progpy is not installed: pip install progpy')
+    'progpy.models.pneumatic_valve', reason='progpy is not installed: pip install progpy'
+)
 pytestmark = needs_messages
 RATE = 200.0  # Hz
 FLUID = {'pL': 3.5e5, 'pR': 2.0e5}  # Pa, before and behind the plug
@@ -33,8 +33,7 @@ FAULT = 240.0  # s
 
 def record(seconds: float, fault: str = '', factor: float = 1.0) -> dict[str, np.ndarray]:
     """Simulate strokes of the valve; from FAULT on a state of wear has another value."""
-    model = valve.PneumaticValveBase(
-        process_noise=0, measurement_noise=0, At=ORIFICE, Ab=ORIFICE)
+    model = valve.PneumaticValveBase(process_noise=0, measurement_noise=0, At=ORIFICE, Ab=ORIFICE)
     p = model.parameters
     x = {**p['x0'], 'Aeb': 1e-9, 'Aet': 1e-9, 'pDiff': FLUID['pL'] - FLUID['pR']}
     x['mTop'] *= p['pAtm'] / p['pSupply']
@@ -49,14 +48,21 @@ def record(seconds: float, fault: str = '', factor: float = 1.0) -> dict[str, np
         states[i] = x['x'], x['mBot'], x['mTop']
     position, bottom, top = states.T
     gas = p['R'] * p['gas_temp'] / p['gas_mass']
-    ps = gas * (bottom / (p['Vbot0'] + p['Ap'] * position)
-                - top / (p['Vtop0'] + p['Ap'] * (p['Ls'] - position)))
+    ps = gas * (
+        bottom / (p['Vbot0'] + p['Ap'] * position)
+        - top / (p['Vtop0'] + p['Ap'] * (p['Ls'] - position))
+    )
     rng = np.random.default_rng(1)
-    return {'stamp': np.arange(1, n + 1) * round(1e9 / RATE), 'cv': cv,
-            'x1': position / p['Ls'] + 5e-4 * rng.standard_normal(n),
-            'ps': ps + 200.0 * rng.standard_normal(n),
-            'p1': np.full(n, FLUID['pL']), 'p2': np.full(n, FLUID['pR']),
-            't1': np.full(n, 20.0), 'flow': np.full(n, 5.0)}
+    return {
+        'stamp': np.arange(1, n + 1) * round(1e9 / RATE),
+        'cv': cv,
+        'x1': position / p['Ls'] + 5e-4 * rng.standard_normal(n),
+        'ps': ps + 200.0 * rng.standard_normal(n),
+        'p1': np.full(n, FLUID['pL']),
+        'p2': np.full(n, FLUID['pR']),
+        't1': np.full(n, 20.0),
+        'flow': np.full(n, 5.0),
+    }
 
 
 @pytest.fixture(scope='module')
@@ -65,16 +71,27 @@ def settings(tmp_path_factory: pytest.TempPathFactory) -> Settings:
     folder: Path = tmp_path_factory.mktemp('progpy')
     write_columns(folder / 'healthy.mcap', record(420.0))
     p = valve.PneumaticValveBase().parameters
-    sheet = {'mass': p['m'], 'stroke': p['Ls'], 'area': p['Ap'], 'gravity': -p['g'],
-             'plug_diameter': float(np.sqrt(4.0 * p['Av'] / np.pi)), 'plug_table': [1.0] * 12,
-             'preload': 6.7, 'stiffness': 50e3, 'alpha1': 150.0, 'alpha4': 1000.0,
-             'alpha5': 1000.0, 'ps_max': 6_000_000.0}
+    sheet = {
+        'mass': p['m'],
+        'stroke': p['Ls'],
+        'area': p['Ap'],
+        'gravity': -p['g'],
+        'plug_diameter': float(np.sqrt(4.0 * p['Av'] / np.pi)),
+        'plug_table': [1.0] * 12,
+        'preload': 6.7,
+        'stiffness': 50e3,
+        'alpha1': 150.0,
+        'alpha4': 1000.0,
+        'alpha5': 1000.0,
+        'ps_max': 6_000_000.0,
+    }
     given = [word for item in sheet.items() for word in ('--set', '{}={}'.format(*item))]
     out = folder / 'valve.yaml'
     assert commission([str(folder / 'healthy.mcap'), '--out', str(out), *given]) == 0
     (node,) = yaml.safe_load(out.read_text()).values()
-    return Settings(**{**node['ros__parameters'],
-                       'plug_table': tuple(node['ros__parameters']['plug_table'])})
+    return Settings(
+        **{**node['ros__parameters'], 'plug_table': tuple(node['ros__parameters']['plug_table'])}
+    )
 
 
 def judged(settings: Settings, fault: str, factor: float) -> SignatureView:
@@ -88,10 +105,13 @@ def test_the_commissioning_command_finds_the_valve_of_progpy(settings):
     assert settings.alpha1 * settings.mass == pytest.approx(x0['r'], rel=0.2)
 
 
-@pytest.mark.parametrize('fault, factor, cause, value', [
-    ('k', 0.97, 'spring_softer', -0.03), ('r', 3.0, 'friction_up', 2.0), ('', 1.0, 'none', None)])
-def test_spring_and_friction_failures_of_progpy_are_told_apart(settings, fault, factor, cause,
-                                                               value):
+@pytest.mark.parametrize(
+    'fault, factor, cause, value',
+    [('k', 0.97, 'spring_softer', -0.03), ('r', 3.0, 'friction_up', 2.0), ('', 1.0, 'none', None)],
+)
+def test_spring_and_friction_failures_of_progpy_are_told_apart(
+    settings, fault, factor, cause, value
+):
     view = judged(settings, fault, factor)
     assert view.cause == cause
     if value is not None:

@@ -43,8 +43,19 @@ def motion(seed: int, seconds: float) -> np.ndarray:
     return x
 
 
-def valve(seed=0, seconds=260.0, t_fault=150.0, dK=0.0, dF=0.0, gain=0.0, shape=0.0,
-          preload=0.0, position=(0.0, 0.0), pressure=0.0, dp_offset=0.0):
+def valve(
+    seed=0,
+    seconds=260.0,
+    t_fault=150.0,
+    dK=0.0,
+    dF=0.0,
+    gain=0.0,
+    shape=0.0,
+    preload=0.0,
+    position=(0.0, 0.0),
+    pressure=0.0,
+    dp_offset=0.0,
+):
     """Columns of a run: force balance with a fault from t_fault on, plug error from the start."""
     x = motion(seed, seconds)
     rng = np.random.default_rng(seed + 1000)
@@ -65,8 +76,10 @@ def valve(seed=0, seconds=260.0, t_fault=150.0, dK=0.0, dF=0.0, gain=0.0, shape=
 
 def run(columns, signature=None, alarm_at=np.inf, keep=slice(None)):
     signature = signature or Signature(C)
-    results = [signature.update(int(t), float(x), float(ps), float(dp), True, t * 1e-9 >= alarm_at)
-               for t, x, ps, dp in zip(*(column[keep] for column in columns), strict=True)]
+    results = [
+        signature.update(int(t), float(x), float(ps), float(dp), True, t * 1e-9 >= alarm_at)
+        for t, x, ps, dp in zip(*(column[keep] for column in columns), strict=True)
+    ]
     return signature, np.array(results)
 
 
@@ -81,17 +94,20 @@ def test_a_healthy_valve_is_learned_verified_and_left_alone():
     assert 5e-4 < s.sigma < 1.2e-3
 
 
-@pytest.mark.parametrize('change, cause, truth, tolerance', [
-    ({'dF': -0.5}, 'friction_down', -0.5, 0.15),
-    ({'dF': 1.0}, 'friction_up', 1.0, 0.2),
-    ({'dK': 0.03}, 'spring_stiffer', 0.03, 0.005),
-    ({'dK': -0.03}, 'spring_softer', -0.03, 0.005),
-    ({'preload': 0.06}, 'preload', 0.06 * C.force_scale, 15.0),
-    ({'position': (0.05, 0.0)}, 'position_gain', 0.05, 0.006),
-    ({'position': (0.0, -0.03)}, 'position_offset', -0.03, 0.004),
-    ({'pressure': -0.05}, 'pressure_gain', -0.05, 0.006),
-    ({'dp_offset': 50e3}, 'dp_offset', 50e3, 6e3),
-])
+@pytest.mark.parametrize(
+    'change, cause, truth, tolerance',
+    [
+        ({'dF': -0.5}, 'friction_down', -0.5, 0.15),
+        ({'dF': 1.0}, 'friction_up', 1.0, 0.2),
+        ({'dK': 0.03}, 'spring_stiffer', 0.03, 0.005),
+        ({'dK': -0.03}, 'spring_softer', -0.03, 0.005),
+        ({'preload': 0.06}, 'preload', 0.06 * C.force_scale, 15.0),
+        ({'position': (0.05, 0.0)}, 'position_gain', 0.05, 0.006),
+        ({'position': (0.0, -0.03)}, 'position_offset', -0.03, 0.004),
+        ({'pressure': -0.05}, 'pressure_gain', -0.05, 0.006),
+        ({'dp_offset': 50e3}, 'dp_offset', 50e3, 6e3),
+    ],
+)
 def test_a_change_is_found_named_and_sized(change, cause, truth, tolerance):
     signature, _ = run(valve(seed=3, seconds=330.0, **change))
     view = signature.view()
@@ -145,8 +161,14 @@ def test_a_saved_reference_continues_where_it_was():
     good = learned.save()
     assert Signature(C).save() == {}
     before = restarted.state.tobytes()
-    for wrong in ({**good, 'theta': [1.0]}, {**good, 'sigma': 0.0}, {'theta': 1}, {},
-                  {**good, 'J0': 'x'}, {**good, 'sigma': np.nan}):
+    for wrong in (
+        {**good, 'theta': [1.0]},
+        {**good, 'sigma': 0.0},
+        {'theta': 1},
+        {},
+        {**good, 'J0': 'x'},
+        {**good, 'sigma': np.nan},
+    ):
         with pytest.raises(ValueError, match='signature reference'):
             restarted.load(wrong)
     assert restarted.state.tobytes() == before
@@ -237,8 +259,11 @@ def test_bad_geometry_is_refused():
 def test_messages_name_the_same_numbers():
     message = Path(__file__).parents[3].joinpath('damadics_msgs/msg/Signature.msg').read_text()
     for prefix, names in (('CAUSE_', CAUSES), ('STATE_', ()), ('FAMILY_', ())):
-        stated = {line.split()[1]: int(line.split('=')[1].split('#')[0])
-                  for line in message.splitlines() if line.startswith(f'uint8 {prefix}')}
+        stated = {
+            line.split()[1]: int(line.split('=')[1].split('#')[0])
+            for line in message.splitlines()
+            if line.startswith(f'uint8 {prefix}')
+        }
         assert stated
         for name, number in stated.items():
             assert getattr(st, name) == number

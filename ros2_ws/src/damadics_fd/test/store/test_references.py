@@ -84,10 +84,13 @@ def test_newest_slot_damaged_falls_back_to_the_other(tmp_path, learned):
     assert load_reference(path, 'LV-101', SETTINGS).comment == 'old'
 
 
-@pytest.mark.parametrize(('change', 'reason'), [
-    ({'actuator': 'LV-102'}, 'belongs to LV-102, not to LV-101'),
-    ({'settings': Settings.for_mode('monitor', k2=300.0).to_dict()}, 'k2 = 400.0 was 300.0'),
-])
+@pytest.mark.parametrize(
+    ('change', 'reason'),
+    [
+        ({'actuator': 'LV-102'}, 'belongs to LV-102, not to LV-101'),
+        ({'settings': Settings.for_mode('monitor', k2=300.0).to_dict()}, 'k2 = 400.0 was 300.0'),
+    ],
+)
 def test_reference_of_something_else_is_refused(tmp_path, learned, change, reason):
     save_reference(tmp_path / 'x', reference(learned, **change))
     with pytest.raises(ReferenceFileError, match=reason):
@@ -117,17 +120,25 @@ def test_failed_write_keeps_what_is_there(tmp_path, learned, monkeypatch):
 
     def full(*_):
         raise OSError(28, 'No space left on device')
+
     monkeypatch.setattr('os.fsync', full)
     with pytest.raises(OSError, match='No space'):
         save_reference(path, reference(learned, comment='three'))
     assert load_reference(path, 'LV-101', SETTINGS).comment == 'two'
 
 
-@pytest.mark.parametrize('damage', [
-    lambda s: s.pop('w1'), lambda s: s.update(w3=[1.0]), lambda s: s.update(w1=[1.0]),
-    lambda s: s.update(b1=float('nan')), lambda s: s.update(ah5=0.0), lambda s: s.update(b1=1e9),
-    lambda s: s.update(w2='x'),
-])
+@pytest.mark.parametrize(
+    'damage',
+    [
+        lambda s: s.pop('w1'),
+        lambda s: s.update(w3=[1.0]),
+        lambda s: s.update(w1=[1.0]),
+        lambda s: s.update(b1=float('nan')),
+        lambda s: s.update(ah5=0.0),
+        lambda s: s.update(b1=1e9),
+        lambda s: s.update(w2='x'),
+    ],
+)
 def test_wrong_learned_state_leaves_the_estimator_untouched(learned, damage):
     estimator, bad = Estimator(SETTINGS), json.loads(json.dumps(learned))
     damage(bad)

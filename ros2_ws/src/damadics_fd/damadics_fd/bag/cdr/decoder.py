@@ -38,8 +38,10 @@ class Decoder:
         self._mcap, self._number = mcap, number
         self.path, self.topic, self.fields = mcap.path, channel.topic, fields
         if channel.message_encoding != 'cdr':
-            raise BagError(f'{channel.topic} is encoded as {channel.message_encoding!r}, not as'
-                           ' cdr', mcap.path)
+            raise BagError(
+                f'{channel.topic} is encoded as {channel.message_encoding!r}, not as cdr',
+                mcap.path,
+            )
         if schema is None or schema.encoding != 'ros2msg':
             raise BagError(f'{channel.topic} has no ros2msg definition', mcap.path)
         self.kind = schema.name
@@ -72,7 +74,7 @@ class Decoder:
         groups: list[tuple[NDArray, Columns]] = []
         while left.any():
             first = int(left.argmax())
-            layout = self._layout(batch.data[starts[first]:starts[first] + sizes[first]])
+            layout = self._layout(batch.data[starts[first] : starts[first] + sizes[first]])
             if len(groups) < MOST_LAYOUTS:
                 rows = left & (sizes == sizes[first])
                 rows[rows] = same_layout(batch.words, starts[rows], layout)
@@ -131,7 +133,7 @@ class Decoder:
         """Return how to decode messages that are like the first one of a chunk."""
         if not self._alike and (found := first_message(data, self._number)):
             start, size = found
-            layout = self._layout(data[start:start + size])
+            layout = self._layout(data[start : start + size])
             self._alike = Alike.of(layout, size, self._places(layout))
         return self._alike
 
@@ -148,7 +150,8 @@ class Decoder:
 
     def _columns(self, words: Words, starts: NDArray, layout: Layout) -> Columns:
         return {
-            name: _time(words, starts + place, layout.order) if isinstance(place, int)
+            name: _time(words, starts + place, layout.order)
+            if isinstance(place, int)
             else _field(words, starts, place, layout.order)
             for name, place in self._places(layout).items()
         }
@@ -167,14 +170,16 @@ class Decoder:
                 found['frame_id' if place.name == 'header.frame_id' else place.name] = place
         if self.fields is None:
             return {
-                name: place for name, place in found.items()
+                name: place
+                for name, place in found.items()
                 if isinstance(place, int) or not place.text
             }
         missing = [name for name in self.fields if name not in (*found, 'log_time')]
         if missing:
             raise BagError(
                 f'{self.topic} ({self.kind}) has no field {", ".join(missing)}; it has '
-                + ', '.join(found), self.path,
+                + ', '.join(found),
+                self.path,
             )
         chosen = [*self.fields, *(['stamp'] if 'stamp' in found else [])]
         return {name: found[name] for name in chosen if name != 'log_time'}
@@ -202,8 +207,11 @@ def _field(words: Words, starts: NDArray, place: Place, order: str) -> NDArray:
     if place.text:
         width = place.repeat or 0
         rows = words.w1[starts[:, None] + (place.offset + np.arange(width))]
-        return np.char.decode(rows.view(f'S{width}')[:, 0] if width else np.zeros(len(rows), 'S1'),
-                              'utf-8', 'replace')
+        return np.char.decode(
+            rows.view(f'S{width}')[:, 0] if width else np.zeros(len(rows), 'S1'),
+            'utf-8',
+            'replace',
+        )
     size = int(place.dtype[1])
     source: NDArray[Any] = words[(1, 2, 4, 8).index(size)]
     if place.repeat is None:

@@ -14,9 +14,19 @@ from damadics_fd.bag.errors import BagError
 
 SEPARATOR = '=' * 80
 PRIMITIVES = {
-    'bool': 'u1', 'byte': 'u1', 'char': 'u1', 'int8': 'i1', 'uint8': 'u1', 'int16': 'i2',
-    'uint16': 'u2', 'int32': 'i4', 'uint32': 'u4', 'int64': 'i8', 'uint64': 'u8',
-    'float32': 'f4', 'float64': 'f8',
+    'bool': 'u1',
+    'byte': 'u1',
+    'char': 'u1',
+    'int8': 'i1',
+    'uint8': 'u1',
+    'int16': 'i2',
+    'uint16': 'u2',
+    'int32': 'i4',
+    'uint32': 'u4',
+    'int64': 'i8',
+    'uint64': 'u8',
+    'float32': 'f4',
+    'float64': 'f8',
 }
 _FIELD = re.compile(r'^([\w/]+)(<=\d+)?(\[(<=)?(\d*)\])?\s+(\w+)(\s+.*|\s*=.*)?$')
 _MOST_TYPES = 1000  # in one schema; a hostile file may say anything

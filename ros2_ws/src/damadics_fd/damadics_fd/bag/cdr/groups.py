@@ -61,8 +61,20 @@ class Alike:
         :param first: row of the first message in it.
         :return: number of messages, -1 where one of them or the chunk is not as expected.
         """
-        return int(kernels.decode(words, end, number, self.size, self._places, self._values,
-                                  self._offsets, self._times, block, first))
+        return int(
+            kernels.decode(
+                words,
+                end,
+                number,
+                self.size,
+                self._places,
+                self._values,
+                self._offsets,
+                self._times,
+                block,
+                first,
+            )
+        )
 
     def columns(self, block: NDArray[np.uint64]) -> dict[str, NDArray[Any]]:
         """View a block as columns."""

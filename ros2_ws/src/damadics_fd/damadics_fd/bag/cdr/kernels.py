@@ -89,8 +89,16 @@ def index(
 
 @jit
 def decode(
-    words: Words, end: int, channel: int, size: int, places: NDArray, values: NDArray,
-    offsets: NDArray, times: NDArray, out: NDArray, first: int,
+    words: Words,
+    end: int,
+    channel: int,
+    size: int,
+    places: NDArray,
+    values: NDArray,
+    offsets: NDArray,
+    times: NDArray,
+    out: NDArray,
+    first: int,
 ) -> int:
     """
     Copy 64-bit fields and times of one channel's messages to columns, where all are alike.

@@ -64,17 +64,23 @@ class Layout:
         :param size: size of each message [B], at least that of the layout.
         """
         kinds = [
-            f'S{place.repeat}' if place.text
-            else (self.order + place.dtype if place.repeat is None
-                  else (self.order + place.dtype, (place.repeat,)))
+            f'S{place.repeat}'
+            if place.text
+            else (
+                self.order + place.dtype
+                if place.repeat is None
+                else (self.order + place.dtype, (place.repeat,))
+            )
             for place in self.places
         ]
-        return np.dtype({
-            'names': [place.name for place in self.places],
-            'formats': kinds,
-            'offsets': [place.offset for place in self.places],
-            'itemsize': max(size or 0, self.size),
-        })
+        return np.dtype(
+            {
+                'names': [place.name for place in self.places],
+                'formats': kinds,
+                'offsets': [place.offset for place in self.places],
+                'itemsize': max(size or 0, self.size),
+            }
+        )
 
     def matches(self, messages: NDArray[np.uint8]) -> bool:
         """
@@ -88,7 +94,7 @@ class Layout:
         if not ((messages[:, 0] == 0) & (messages[:, 1] == order)).all():
             return False
         for offset, value in self.lengths:
-            word = np.ascontiguousarray(messages[:, offset:offset + 4]).view(self.order + 'u4')
+            word = np.ascontiguousarray(messages[:, offset : offset + 4]).view(self.order + 'u4')
             if not (word == value).all():
                 return False
         return True
@@ -205,7 +211,7 @@ class Encoder:
         self._constant = np.zeros((1, layout.size), np.uint8)
         self._constant[0, :HEADER_SIZE] = list(HEADER)
         for offset, length in layout.lengths:
-            self._constant[0, offset:offset + 4] = list(struct.pack('<I', length))
+            self._constant[0, offset : offset + 4] = list(struct.pack('<I', length))
         for name, text in texts.items():
             self._constant.view(self._dtype)[name] = text.encode()
 

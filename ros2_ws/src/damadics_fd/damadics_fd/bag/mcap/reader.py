@@ -80,7 +80,7 @@ class Batch:
     def message(self, row: int) -> bytes:
         """Return one serialised message."""
         start = self.starts[row]
-        return self.data[start:start + self.sizes[row]].tobytes()
+        return self.data[start : start + self.sizes[row]].tobytes()
 
 
 class McapFile:
@@ -93,7 +93,7 @@ class McapFile:
     :raises BagError: where the file cannot be opened or is no MCAP file.
     """
 
-    def __init__(self, path: str | Path, tolerant: bool = False, limits: Limits = Limits()):  # noqa: B008
+    def __init__(self, path: str | Path, tolerant: bool = False, limits: Limits = Limits()):
         self.path = Path(path)
         self.limits = limits
         self.problems: list[Problem] = []
@@ -124,9 +124,13 @@ class McapFile:
         self._stream.close()
 
     def _make_loader(self) -> Loader:
-        listed = {} if self.summary.moved else {
-            at + HEAD.size: length - HEAD.size for at, length in self.summary.lengths.items()
-        }
+        listed = (
+            {}
+            if self.summary.moved
+            else {
+                at + HEAD.size: length - HEAD.size for at, length in self.summary.lengths.items()
+            }
+        )
         return Loader(self._stream.fileno(), self.limits, listed)
 
     def _read(self, at: int, size: int) -> bytes:
@@ -221,7 +225,7 @@ class McapFile:
         if len(begin) < HEAD.size:
             raise BagError('ends in the middle of a record')
         op, length = HEAD.unpack_from(begin)
-        content = begin[HEAD.size:][:length]
+        content = begin[HEAD.size :][:length]
         if op == Op.CHUNK and not self._chunked:
             self._chunked = well_formed(Op.CHUNK, content, length)
         if at + HEAD.size + length > self._size:
@@ -274,7 +278,7 @@ class McapFile:
         n, k, end = kernels.index(words, len(data), channels, starts, sizes, others)
         for place in others[:k].tolist():
             op, length = HEAD.unpack_from(data, place)
-            content = data[place + HEAD.size:place + HEAD.size + length].tobytes()
+            content = data[place + HEAD.size : place + HEAD.size + length].tobytes()
             try:
                 self._note(Op(op), content)
             except BagError as error:
@@ -312,7 +316,7 @@ class McapFile:
             end = at + HEAD.size + length
             if not 0 < op < 0x10 or length > self.limits.record or end > self._size:
                 return False
-            if not well_formed(Op(op), begin[HEAD.size:][:length], length):
+            if not well_formed(Op(op), begin[HEAD.size :][:length], length):
                 return False
             if op == Op.FOOTER or end == self._size:
                 return True

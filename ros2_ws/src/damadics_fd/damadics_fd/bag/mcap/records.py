@@ -129,7 +129,7 @@ class Fields:
         if size > len(self._content) - self._at:
             raise BagError('a record is shorter than its fields say')
         self._at += size
-        return self._content[self._at - size:self._at]
+        return self._content[self._at - size : self._at]
 
     def unpack(self, layout: struct.Struct) -> tuple:
         """Return the next fields of fixed size."""

@@ -71,7 +71,7 @@ def read_summary(read: Read, size: int, limits: Limits) -> Summary:
         data = read(start, end - start + FOOTER_SIZE - 4)
         if crc32(data) == crc or (crc == 0 and start == stated):
             try:
-                summary = _parse(memoryview(data)[:end - start])
+                summary = _parse(memoryview(data)[: end - start])
             except (BagError, ValueError):
                 return Summary()
             summary.present, summary.moved = True, start != stated

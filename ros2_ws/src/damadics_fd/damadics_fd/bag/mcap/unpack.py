@@ -54,7 +54,7 @@ class Slot:
             raise BagError(f'a chunk of {chunk.size} bytes from {len(packed)} is beyond the limit')
         if chunk.size > len(self._data):
             self._data = np.empty(chunk.size, np.uint8)
-        data = self._data[:chunk.size]
+        data = self._data[: chunk.size]
         if self._decompress(chunk, packed, memoryview(data)) != chunk.size:
             raise BagError('a chunk is damaged: its size does not match')
         if chunk.crc and crc32(data) != chunk.crc:

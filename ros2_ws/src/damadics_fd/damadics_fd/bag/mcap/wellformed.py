@@ -45,7 +45,7 @@ def well_formed(op: Op, content: bytes, length: int) -> bool:
             prefix = 4 if size == TEXT else 8
             if at + prefix > len(content):
                 return at + prefix <= length
-            at += prefix + int.from_bytes(content[at:at + prefix], 'little')
+            at += prefix + int.from_bytes(content[at : at + prefix], 'little')
         else:
             at += size
     return at == length

@@ -52,10 +52,17 @@ def message_dtype(size: int) -> np.dtype:
     :param size: size of the data [B].
     :return: packed structured type with the fields of the record.
     """
-    return np.dtype([
-        ('op', 'u1'), ('length', '<u8'), ('channel', '<u2'), ('sequence', '<u4'),
-        ('log_time', '<u8'), ('publish_time', '<u8'), ('data', f'V{size}'),
-    ])
+    return np.dtype(
+        [
+            ('op', 'u1'),
+            ('length', '<u8'),
+            ('channel', '<u2'),
+            ('sequence', '<u4'),
+            ('log_time', '<u8'),
+            ('publish_time', '<u8'),
+            ('data', f'V{size}'),
+        ]
+    )
 
 
 class McapWriter:
@@ -74,8 +81,12 @@ class McapWriter:
     """
 
     def __init__(
-        self, stream: Sink, profile: str = 'ros2', chunk_size: int = CHUNK_SIZE,
-        level: int = LEVEL, message_index: bool = True,
+        self,
+        stream: Sink,
+        profile: str = 'ros2',
+        chunk_size: int = CHUNK_SIZE,
+        level: int = LEVEL,
+        message_index: bool = True,
     ):
         self._stream = stream
         self._chunk_size = chunk_size
@@ -228,7 +239,8 @@ class McapWriter:
             return
         start, end = min(self._log_times), max(self._log_times)
         self._times = (
-            (start, end) if self._times is None
+            (start, end)
+            if self._times is None
             else (min(start, self._times[0]), max(end, self._times[1]))
         )
         content = b''.join(self._parts)
@@ -246,19 +258,21 @@ class McapWriter:
         index_at = at + len(chunk)
         for channel_id, entries in self._index.items() if self._message_index else ():
             offsets.append(struct.pack('<HQ', channel_id, index_at))
-            indexes.append(record(
-                Op.MESSAGE_INDEX, struct.pack('<H', channel_id), string(b''.join(entries))
-            ))
+            indexes.append(
+                record(Op.MESSAGE_INDEX, struct.pack('<H', channel_id), string(b''.join(entries)))
+            )
             index_at += len(indexes[-1])
         self._write(chunk + b''.join(indexes))
-        self._chunk_index.append(record(
-            Op.CHUNK_INDEX,
-            CHUNK_INDEX.pack(start, end, at, len(chunk)),
-            string(b''.join(offsets)),
-            struct.pack('<Q', sum(map(len, indexes))),
-            string('zstd'),
-            struct.pack('<QQ', len(packed), len(content)),
-        ))
+        self._chunk_index.append(
+            record(
+                Op.CHUNK_INDEX,
+                CHUNK_INDEX.pack(start, end, at, len(chunk)),
+                string(b''.join(offsets)),
+                struct.pack('<Q', sum(map(len, indexes))),
+                string('zstd'),
+                struct.pack('<QQ', len(packed), len(content)),
+            )
+        )
         self._reset_chunk()
 
     def flush(self) -> None:
@@ -270,9 +284,9 @@ class McapWriter:
         """Write a Metadata record."""
         self.end_chunk()
         data = record(Op.METADATA, string(name), string_map(entries))
-        self._metadata_index.append(record(
-            Op.METADATA_INDEX, struct.pack('<QQ', self.position, len(data)), string(name)
-        ))
+        self._metadata_index.append(
+            record(Op.METADATA_INDEX, struct.pack('<QQ', self.position, len(data)), string(name))
+        )
         self._write(data)
 
     def finish(self) -> None:
@@ -282,8 +296,14 @@ class McapWriter:
         start, end = self._times or (0, 0)
         counts = b''.join(struct.pack('<HQ', *entry) for entry in self._counts.items())
         statistics = STATISTICS.pack(
-            self.message_count, len(self._schemas), len(self._channels), 0,
-            len(self._metadata_index), len(self._chunk_index), start, end,
+            self.message_count,
+            len(self._schemas),
+            len(self._channels),
+            0,
+            len(self._metadata_index),
+            len(self._chunk_index),
+            start,
+            end,
         )
         groups = {
             Op.SCHEMA: [schema_record(schema) for schema in self._schemas],

@@ -32,8 +32,11 @@ NANO = 1e9
 NAMING_S = (30.0, 300.0, np.inf)  # after an alarm; a later fault must not change the name
 STRIDE = 120  # rows between two attempts of mode scada to name a fault
 JUDGEMENT = ('cause', 'confidence', 'strength', 'spread')
-NEEDED = {'paper': ('cv', 'x1'), 'scada': ('cv', 'x1', 'p1', 'p2'),
-          'monitor': ('cv', 'x1', 'p1', 'p2', 'ps')}
+NEEDED = {
+    'paper': ('cv', 'x1'),
+    'scada': ('cv', 'x1', 'p1', 'p2'),
+    'monitor': ('cv', 'x1', 'p1', 'p2', 'ps'),
+}
 PIECE = 8192  # rows judged at once: they fit the cache, and calls cost nothing against them
 
 
@@ -159,7 +162,9 @@ class Plan:
 
 
 def replay(
-    recording: Recording, plan: Plan, progress: Callable[[int], None] = lambda count: None,
+    recording: Recording,
+    plan: Plan,
+    progress: Callable[[int], None] = lambda count: None,
     stem: str = '',
 ) -> Outcome:
     """
@@ -227,8 +232,12 @@ def _replay(
     if thinner and plan.figures:
         _draw(thinner, recording, outcome, plan.figures / f'{stem}.png')
     if forces and plan.figures and chain.signature.view().state >= STATE_VERIFY:
-        force_over_position(forces, chain.signature, plan.figures / f'{stem}_signature.png',
-                            Path(recording.name).name.removesuffix('.mcap'))
+        force_over_position(
+            forces,
+            chain.signature,
+            plan.figures / f'{stem}_signature.png',
+            Path(recording.name).name.removesuffix('.mcap'),
+        )
 
 
 def _judge_refused(outcome: Outcome, lacking: set[str]) -> None:
@@ -239,9 +248,11 @@ def _judge_refused(outcome: Outcome, lacking: set[str]) -> None:
     reason = max(outcome.refused, key=lambda name: outcome.refused[name])
     why = f'{EXPLANATIONS[reason]}; {REMEDIES[reason]}'
     if lacking:
-        why = (f'{", ".join(sorted(lacking))} not measured, but mode {outcome.mode} needs'
-               f' {", ".join(NEEDED[outcome.mode])}: name the signals with --map, or take'
-               ' another --mode')
+        why = (
+            f'{", ".join(sorted(lacking))} not measured, but mode {outcome.mode} needs'
+            f' {", ".join(NEEDED[outcome.mode])}: name the signals with --map, or take'
+            ' another --mode'
+        )
     text = f'{refused} of {outcome.samples} samples were refused ({reason}): {why}'
     if refused == outcome.samples:
         raise BagError(text, outcome.bag)

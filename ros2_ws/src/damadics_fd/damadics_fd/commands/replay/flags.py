@@ -17,8 +17,20 @@ from damadics_fd.core.pipeline import Result
 NUMBER = 'damadics_msgs/msg/Float64Stamped'
 ESTIMATE = 'damadics_msgs/msg/Estimate'
 FLAG = 'damadics_msgs/msg/FaultFlag'
-SCALARS = ('x2', 'x1_hat', 'x2_hat', 'xi1', 'xi2', 'phi', 'x1', 'u', 'ps', 'dp', 'progress',
-           'phase')
+SCALARS = (
+    'x2',
+    'x1_hat',
+    'x2_hat',
+    'xi1',
+    'xi2',
+    'phi',
+    'x1',
+    'u',
+    'ps',
+    'dp',
+    'progress',
+    'phase',
+)
 
 
 class FlagWriter:
@@ -31,8 +43,9 @@ class FlagWriter:
 
     def __init__(self, path: Path, recording: Recording):
         prefix = recording.topic.removesuffix('measurement') if not recording.table else '/'
-        self._names = {name: prefix + name for name in ('estimate', 'residual', 'threshold',
-                                                        'fault_flag')}
+        self._names = {
+            name: prefix + name for name in ('estimate', 'residual', 'threshold', 'fault_flag')
+        }
         self._frame_id = _frame_id(recording)
         self._bag = BagWriter(path)
         kinds = {'estimate': ESTIMATE, 'residual': NUMBER, 'threshold': NUMBER, 'fault_flag': FLAG}
@@ -50,19 +63,28 @@ class FlagWriter:
         stamp = estimates['stamp']
         alphas = np.stack([estimates[name] for name in ('alpha1', 'alpha4', 'alpha5')], axis=1)
         columns = {name: estimates[name] for name in SCALARS} | {'alpha_hat': alphas}
-        self._bag.write_columns(stamp, {
-            self._names['estimate']: columns,
-            self._names['residual']: {'data': decisions['residual']},
-            self._names['threshold']: {'data': decisions['threshold']},
-        }, self._frame_id)
+        self._bag.write_columns(
+            stamp,
+            {
+                self._names['estimate']: columns,
+                self._names['residual']: {'data': decisions['residual']},
+                self._names['threshold']: {'data': decisions['threshold']},
+            },
+            self._frame_id,
+        )
         self._write_flags(decisions)
 
     def _write_flags(self, decisions: NDArray) -> None:
         """Write the flag on every change and once a second."""
-        keys = np.stack([
-            decisions['fault'].astype(np.int64), decisions['state'], decisions['level'],
-            decisions['stamp'] // NANO,
-        ], axis=1)
+        keys = np.stack(
+            [
+                decisions['fault'].astype(np.int64),
+                decisions['state'],
+                decisions['level'],
+                decisions['stamp'] // NANO,
+            ],
+            axis=1,
+        )
         before = np.roll(keys, 1, axis=0)
         before[0] = self._last_flag if self._last_flag is not None else -1
         self._last_flag = tuple(keys[-1].tolist())
@@ -89,8 +111,11 @@ def _frame_id(recording: Recording) -> str:
     if recording.table or recording.maps:
         return recording.table.name if recording.table else ''
     try:
-        chunk = next(iter_columns(recording.path, recording.topic, ['frame_id'],
-                                  on_problem=lambda text: None))
+        chunk = next(
+            iter_columns(
+                recording.path, recording.topic, ['frame_id'], on_problem=lambda text: None
+            )
+        )
     except BagError:
         return ''  # a message without header; the reader has its say when it is replayed
     return str(chunk['frame_id'][0]) if len(chunk['frame_id']) else ''

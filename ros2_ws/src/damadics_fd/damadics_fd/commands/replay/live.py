@@ -49,8 +49,7 @@ class Player(Node):
         self._state = self.create_publisher(FaultState, 'fault_state', qos.SAMPLES)
         self._judges = None
         if settings:
-            self._judges = estimator_for(settings), Detector(
-                settings, load_causes().classes)
+            self._judges = estimator_for(settings), Detector(settings, load_causes().classes)
             self._estimate = self.create_publisher(EstimateMessage, 'estimate', qos.SAMPLES)
             self._residual = self.create_publisher(Float64Stamped, 'residual', qos.SAMPLES)
             self._threshold = self.create_publisher(Float64Stamped, 'threshold', qos.SAMPLES)
@@ -91,8 +90,10 @@ class Player(Node):
         """
         rows = zip(
             columns['stamp'].tolist(),
-            *(np.broadcast_to(columns.get(name, np.nan), columns['stamp'].shape).tolist()
-              for name in SIGNALS),
+            *(
+                np.broadcast_to(columns.get(name, np.nan), columns['stamp'].shape).tolist()
+                for name in SIGNALS
+            ),
             strict=True,
         )
         for row, (stamp, *signals) in enumerate(rows):
@@ -101,8 +102,9 @@ class Player(Node):
             set_stamp(message.header.stamp, stamp)
             self._measurement.publish(message)
             if 'fault' in columns:
-                state = FaultState(fault=int(columns['fault'][row]),
-                                   strength=float(columns['strength'][row]))
+                state = FaultState(
+                    fault=int(columns['fault'][row]), strength=float(columns['strength'][row])
+                )
                 state.header.stamp = message.header.stamp
                 self._state.publish(state)
             self._judge(stamp, signals)
@@ -158,7 +160,10 @@ class Player(Node):
 
 
 def publish(
-    recordings: Sequence[Recording], plan: Plan, rate: float, inputs_only: bool = False,
+    recordings: Sequence[Recording],
+    plan: Plan,
+    rate: float,
+    inputs_only: bool = False,
     ros_args: Sequence[str] = (),
 ) -> int:
     """

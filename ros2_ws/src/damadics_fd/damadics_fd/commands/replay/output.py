@@ -31,11 +31,16 @@ def print_table(outcomes: Sequence[Outcome]) -> None:
         if outcome.error:
             rows.append((outcome.bag, outcome.mode, '', '', '', 'failed'))
             continue
-        rows.append((
-            outcome.bag, outcome.mode, f'{outcome.samples:,}', f'{outcome.duration_s:.1f} s',
-            f'{outcome.samples_per_s / 1e6:.2f} M',
-            text + (f'  ({refused} samples refused)' if refused else ''),
-        ))
+        rows.append(
+            (
+                outcome.bag,
+                outcome.mode,
+                f'{outcome.samples:,}',
+                f'{outcome.duration_s:.1f} s',
+                f'{outcome.samples_per_s / 1e6:.2f} M',
+                text + (f'  ({refused} samples refused)' if refused else ''),
+            )
+        )
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for row in rows:
         cells = [

@@ -47,36 +47,78 @@ _counter: Any = None  # samples done by all workers
 def arguments(args: list[str] | None = None) -> argparse.Namespace:
     """Parse and check the command line."""
     parser = argparse.ArgumentParser(
-        prog='replay', epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter,
+        prog='replay',
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
         description='Replay recorded bags or tables through estimator and detector.',
     )
-    parser.add_argument('bags', nargs='+', metavar='BAG', type=Path,
-                        help='MCAP file, bag directory, table (.csv, .txt), or folder of such')
-    parser.add_argument('--mode', choices=MODES, default='monitor',
-                        help='monitor: learn the valve, then watch it; needs ps (default). paper:'
-                        ' the method as printed. scada: slow signals of a control room')
-    parser.add_argument('--settings', type=Path, metavar='FILE',
-                        help='parameter file of the nodes (YAML)')
-    parser.add_argument('--set', action='append', default=[], metavar='NAME=VALUE',
-                        help='one setting; may be repeated')
+    parser.add_argument(
+        'bags',
+        nargs='+',
+        metavar='BAG',
+        type=Path,
+        help='MCAP file, bag directory, table (.csv, .txt), or folder of such',
+    )
+    parser.add_argument(
+        '--mode',
+        choices=MODES,
+        default='monitor',
+        help='monitor: learn the valve, then watch it; needs ps (default). paper:'
+        ' the method as printed. scada: slow signals of a control room',
+    )
+    parser.add_argument(
+        '--settings', type=Path, metavar='FILE', help='parameter file of the nodes (YAML)'
+    )
+    parser.add_argument(
+        '--set',
+        action='append',
+        default=[],
+        metavar='NAME=VALUE',
+        help='one setting; may be repeated',
+    )
     parser.add_argument('--topic', help='topic of the measurements; by default all of them')
-    parser.add_argument('--map', action='append', default=[], metavar='SIGNAL=SOURCE[*FACTOR]',
-                        help='where a signal is: /topic.field in a bag, a column in a table')
-    parser.add_argument('--actuator', type=int, choices=(1, 2, 3),
-                        help='actuator of a table with the tags of the plant')
-    parser.add_argument('--out', type=Path, metavar='FILE',
-                        help='write the result: .json, .csv or .parquet')
+    parser.add_argument(
+        '--map',
+        action='append',
+        default=[],
+        metavar='SIGNAL=SOURCE[*FACTOR]',
+        help='where a signal is: /topic.field in a bag, a column in a table',
+    )
+    parser.add_argument(
+        '--actuator',
+        type=int,
+        choices=(1, 2, 3),
+        help='actuator of a table with the tags of the plant',
+    )
+    parser.add_argument(
+        '--out', type=Path, metavar='FILE', help='write the result: .json, .csv or .parquet'
+    )
     parser.add_argument('--figures', type=Path, metavar='DIR', help='draw the six panels')
-    parser.add_argument('--bag', type=Path, nargs='?', const=BESIDE, metavar='DIR',
-                        help='write the flags as MCAP, next to the input if no DIR is given')
-    parser.add_argument('--jobs', type=int, default=len(os.sched_getaffinity(0)),
-                        help='processes (default: one per core)')
-    parser.add_argument('--live', action='store_true',
-                        help='publish on the topics, with /clock, instead')
-    parser.add_argument('--rate', type=float,
-                        help='speed of --live in multiples of real time (default 1)')
-    parser.add_argument('--inputs-only', action='store_true',
-                        help='with --live: publish no results, for nodes that run')
+    parser.add_argument(
+        '--bag',
+        type=Path,
+        nargs='?',
+        const=BESIDE,
+        metavar='DIR',
+        help='write the flags as MCAP, next to the input if no DIR is given',
+    )
+    parser.add_argument(
+        '--jobs',
+        type=int,
+        default=len(os.sched_getaffinity(0)),
+        help='processes (default: one per core)',
+    )
+    parser.add_argument(
+        '--live', action='store_true', help='publish on the topics, with /clock, instead'
+    )
+    parser.add_argument(
+        '--rate', type=float, help='speed of --live in multiples of real time (default 1)'
+    )
+    parser.add_argument(
+        '--inputs-only',
+        action='store_true',
+        help='with --live: publish no results, for nodes that run',
+    )
     options = parser.parse_args(args)
     if options.live and (options.out or options.figures or options.bag):
         parser.error('--live writes no files: leave out --out, --figures and --bag')

@@ -57,8 +57,17 @@ class Estimator:
         self.last_rejection = ''
         start(self.state, self._settings)
 
-    def update(self, stamp: int, cv: float, x1: float, p1: float, p2: float, t1: float,
-               flow: float, ps: float) -> Estimate | None:
+    def update(
+        self,
+        stamp: int,
+        cv: float,
+        x1: float,
+        p1: float,
+        p2: float,
+        t1: float,
+        flow: float,
+        ps: float,
+    ) -> Estimate | None:
         """
         Take one measurement, with the fields of damadics_msgs/Measurement.
 
@@ -72,8 +81,20 @@ class Estimator:
         :param ps: chamber pressure, gauge [Pa]; NaN where not measured.
         :return: the estimate; None where the sample was refused, see `last_rejection`.
         """
-        reason = update(self.quality, self.state, self._settings, self._estimate, stamp, cv, x1,
-                        p1, p2, t1, flow, ps)
+        reason = update(
+            self.quality,
+            self.state,
+            self._settings,
+            self._estimate,
+            stamp,
+            cv,
+            x1,
+            p1,
+            p2,
+            t1,
+            flow,
+            ps,
+        )
         if reason:
             self.last_rejection = self._explain(reason, stamp, (cv, x1, p1, p2, t1, flow, ps))
             return None
@@ -129,20 +150,28 @@ class Estimator:
         still = (s.elapsed - s.rested) * 1e-9
         if s.phase in (PHASE_PAPER, PHASE_MONITOR):
             if still > STILL:
-                return (f'monitoring limited, no excitation: the stem has not moved for '
-                        f'{still:.0f} s, a change of its friction cannot be seen')
+                return (
+                    f'monitoring limited, no excitation: the stem has not moved for '
+                    f'{still:.0f} s, a change of its friction cannot be seen'
+                )
             return 'monitoring'
         share = f'learning, {100.0 * progress(self.state, self._settings):.0f} %'
         if s.unsettled:
-            return (f'{share}: learning was refused {int(s.unsettled)} times because the valve '
-                    f'changed meanwhile ({self._change()}); inspect it, then learn anew')
+            return (
+                f'{share}: learning was refused {int(s.unsettled)} times because the valve '
+                f'changed meanwhile ({self._change()}); inspect it, then learn anew'
+            )
         late = (s.elapsed - s.start) * 1e-9 >= c.t_learn
         if late:
             if s.travel < c.travel_min:
-                return (f'{share}: insufficient excitation, {float(s.travel):.2f} of '
-                        f'{c.travel_min:.2f} strokes travelled; move the valve both ways')
-            return (f'{share}: insufficient excitation, the stem moved too little of late or in '
-                    'one direction only; move the valve both ways over its stroke')
+                return (
+                    f'{share}: insufficient excitation, {float(s.travel):.2f} of '
+                    f'{c.travel_min:.2f} strokes travelled; move the valve both ways'
+                )
+            return (
+                f'{share}: insufficient excitation, the stem moved too little of late or in '
+                'one direction only; move the valve both ways over its stroke'
+            )
         return share
 
     @property
@@ -206,17 +235,21 @@ class Estimator:
         s, c = state[0], self.settings
         for name, nominal in (('ah1', c.alpha1), ('ah4', c.alpha4), ('ah5', c.alpha5)):
             if abs(s[name] - nominal) > c.band * nominal * (1.0 + 1e-9):
-                raise ValueError(f'learned state: {name} = {float(s[name]):g} is not within '
-                                 f'{100.0 * c.band:g} % of {nominal:g}')
+                raise ValueError(
+                    f'learned state: {name} = {float(s[name]):g} is not within '
+                    f'{100.0 * c.band:g} % of {nominal:g}'
+                )
         square = np.sum(s.w1**2) + np.sum(s.w2**2) + s.eps1**2 + s.b1**2
-        if square > (c.w_max * (1.0 + 1e-9))**2:
+        if square > (c.w_max * (1.0 + 1e-9)) ** 2:
             raise ValueError(f'learned state: the weights exceed w_max = {c.w_max:g}')
 
     def _change(self) -> str:
         offset, stiffness, friction = self.state[0].change
         force = self.settings.stiffness * self.settings.stroke
-        return (f'friction {friction * force:+.0f} N, stiffness {100.0 * stiffness:+.1f} %, '
-                f'offset {offset * force:+.0f} N')
+        return (
+            f'friction {friction * force:+.0f} N, stiffness {100.0 * stiffness:+.1f} %, '
+            f'offset {offset * force:+.0f} N'
+        )
 
     def _explain(self, reason: int, stamp: int, values: tuple[float, ...]) -> str:
         name = quality.REASONS[reason]

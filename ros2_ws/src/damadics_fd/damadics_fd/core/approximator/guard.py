@@ -22,11 +22,24 @@ from damadics_fd.core.jit import jit
 
 N = 3  # offset, relative change of the stiffness, friction / (K L)
 SUMS = 11  # weight, upper triangle of S, q, square of the left side
-STATE = [('place', 'f8'), ('direction', 'f8'), ('moved', 'i8'), ('travel', 'f8'),
-         ('block', 'f8', (SUMS,)), ('base', 'f8', (SUMS,)), ('pool', 'f8', (SUMS,)),
-         ('block_end', 'i8'), ('proven', 'f8'), ('unsettled', 'i8'), ('distance', 'f8'),
-         ('change', 'f8', (N,)), ('theta', 'f8', (N,)), ('cov', 'f8', (N, N)), ('sigma', 'f8'),
-         ('drift', 'f8')]
+STATE = [
+    ('place', 'f8'),
+    ('direction', 'f8'),
+    ('moved', 'i8'),
+    ('travel', 'f8'),
+    ('block', 'f8', (SUMS,)),
+    ('base', 'f8', (SUMS,)),
+    ('pool', 'f8', (SUMS,)),
+    ('block_end', 'i8'),
+    ('proven', 'f8'),
+    ('unsettled', 'i8'),
+    ('distance', 'f8'),
+    ('change', 'f8', (N,)),
+    ('theta', 'f8', (N,)),
+    ('cov', 'f8', (N, N)),
+    ('sigma', 'f8'),
+    ('drift', 'f8'),
+]
 
 CORRELATION = 0.1  # s; samples closer than this count as one
 FRESH = 200_000_000  # ns after its last motion in which the stem counts as moving
@@ -217,8 +230,12 @@ def spread(s: Any, x1: float, d: float) -> float:
     :param d: direction of motion, -1 or 1.
     :return: variance [1].
     """
-    return float(s.cov[0, 0] + s.cov[1, 1] * x1 * x1 + s.cov[2, 2]
-                 + 2.0 * (s.cov[0, 1] * x1 + s.cov[0, 2] * d + s.cov[1, 2] * x1 * d))
+    return float(
+        s.cov[0, 0]
+        + s.cov[1, 1] * x1 * x1
+        + s.cov[2, 2]
+        + 2.0 * (s.cov[0, 1] * x1 + s.cov[0, 2] * d + s.cov[1, 2] * x1 * d)
+    )
 
 
 @jit
@@ -238,8 +255,9 @@ def strays(s: Any, c: Any, dt: float, x1: float, left: float) -> bool:
     d = s.direction
     error = left - s.theta[0] - s.theta[1] * x1 - s.theta[2] * d
     s.drift += min(dt / QUICK, 1.0) * (error - s.drift)
-    noise = (5.0 * s.sigma * math.sqrt(CORRELATION / QUICK)
-             + 4.0 * math.sqrt(max(spread(s, x1, d), 0.0)))
+    noise = 5.0 * s.sigma * math.sqrt(CORRELATION / QUICK) + 4.0 * math.sqrt(
+        max(spread(s, x1, d), 0.0)
+    )
     friction = max(s.theta[2], math.sqrt(s.cov[2, 2]), c.settled_friction)
     if abs(s.drift) <= 1.5 * friction + noise:
         return False

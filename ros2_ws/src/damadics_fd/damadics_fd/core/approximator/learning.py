@@ -18,13 +18,19 @@ from damadics_fd.core.modes import (
 )
 from damadics_fd.core.valve.force import plug_coefficient
 
-STATE = [('elapsed', 'i8'),  # ns since the first sample, gaps that restart the filters left out
-         ('start', 'i8'),  # elapsed time at which learning began
-         ('held_until', 'i8'),  # elapsed time at which the filters have settled after a restart
-         ('armed', '?'), ('phase', 'i8'), ('trend', 'f8'), ('noise', 'f8'),
-         ('rest', 'f8'), ('rested', 'i8'),
-         ('exceeded', 'i8'),  # elapsed time at which an alarm would last have been near
-         *guard.STATE]
+STATE = [
+    ('elapsed', 'i8'),  # ns since the first sample, gaps that restart the filters left out
+    ('start', 'i8'),  # elapsed time at which learning began
+    ('held_until', 'i8'),  # elapsed time at which the filters have settled after a restart
+    ('armed', '?'),
+    ('phase', 'i8'),
+    ('trend', 'f8'),
+    ('noise', 'f8'),
+    ('rest', 'f8'),
+    ('rested', 'i8'),
+    ('exceeded', 'i8'),  # elapsed time at which an alarm would last have been near
+    *guard.STATE,
+]
 
 TREND = 0.1  # s; slower parts of the disturbance are no noise
 MEDIAN = 2.0  # s in which the median of the noise may grow e times
@@ -218,8 +224,13 @@ def excited(s: Any, c: Any) -> bool:
         return False
     phi = max(learned, least_bound(s, c))
     alarm = phi + (c.k2 + s.ah1) * threshold(c, phi, s.ah1)
-    force = guard.foreseen(s, s.ah5 / c.alpha5 - 1.0, largest_noise(s, c) / c.alpha5,
-                             c.preload + c.gate_low, c.preload + 1.0 - c.gate_high)
+    force = guard.foreseen(
+        s,
+        s.ah5 / c.alpha5 - 1.0,
+        largest_noise(s, c) / c.alpha5,
+        c.preload + c.gate_low,
+        c.preload + 1.0 - c.gate_high,
+    )
     if c.alpha5 * force > alarm:
         s.exceeded = s.elapsed
     return bool((s.elapsed - s.exceeded) * 1e-9 >= (c.t_learn - c.t_w) / QUIET)

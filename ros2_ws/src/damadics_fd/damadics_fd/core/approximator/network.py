@@ -8,8 +8,14 @@ from typing import Any
 from damadics_fd.core.jit import jit, layer
 
 N = 5  # terms in each regressor
-STATE = [('w1', 'f8', (N,)), ('w2', 'f8', (N,)), ('eps1', 'f8'), ('b1', 'f8'),
-         ('S1', 'f8', (N,)), ('S2', 'f8', (N,))]
+STATE = [
+    ('w1', 'f8', (N,)),
+    ('w2', 'f8', (N,)),
+    ('eps1', 'f8'),
+    ('b1', 'f8'),
+    ('S1', 'f8', (N,)),
+    ('S2', 'f8', (N,)),
+]
 
 
 M1, L1, C1, LAMBDA1 = 1.41, -10.0225, 0.5974, -2.11  # m, l, c, lambda of S1
@@ -33,8 +39,11 @@ def sigmoids(x2: float) -> tuple[float, float, float]:
     # noise makes that of a resting stem change at random
     above = 1.0 if x2 >= 0.0 else fast
     below = fast if x2 >= 0.0 else MIRROR
-    return (M1 * above / (above + below) + LAMBDA1, M1 / (1.0 + fast) + LAMBDA1,
-            M2 / (1.0 + slow) + LAMBDA2)
+    return (
+        M1 * above / (above + below) + LAMBDA1,
+        M1 / (1.0 + fast) + LAMBDA1,
+        M2 / (1.0 + slow) + LAMBDA2,
+    )
 
 
 @jit

@@ -7,8 +7,17 @@ from typing import Any
 from damadics_fd.core.approximator import network
 from damadics_fd.core.jit import jit, layer
 
-STATE = [('xh1', 'f8'), ('xh2', 'f8'), ('xi1', 'f8'), ('xi2', 'f8'), ('phi', 'f8'),
-         ('ah1', 'f8'), ('ah4', 'f8'), ('ah5', 'f8'), *network.STATE]
+STATE = [
+    ('xh1', 'f8'),
+    ('xh2', 'f8'),
+    ('xi1', 'f8'),
+    ('xi2', 'f8'),
+    ('phi', 'f8'),
+    ('ah1', 'f8'),
+    ('ah4', 'f8'),
+    ('ah5', 'f8'),
+    *network.STATE,
+]
 STIFFEST = 2.5  # largest rate times step; Runge and Kutta's method is unstable from 2.78 on
 SHORTEST = 1e-9  # s
 
@@ -77,8 +86,18 @@ def observe(s: Any, c: Any, dt: float, x1: float, x2: float, u: float) -> None:
 
 
 @jit
-def slopes(s: Any, c: Any, pull: float, gain: float, phi: float, x1: float, x2: float, u: float,
-           xi1: float, xi2: float) -> tuple[float, float]:
+def slopes(
+    s: Any,
+    c: Any,
+    pull: float,
+    gain: float,
+    phi: float,
+    x1: float,
+    x2: float,
+    u: float,
+    xi1: float,
+    xi2: float,
+) -> tuple[float, float]:
     """
     Return the right sides of (10) and (11).
 
@@ -96,13 +115,13 @@ def slopes(s: Any, c: Any, pull: float, gain: float, phi: float, x1: float, x2: 
     """
     robust = min(max(gain * xi2, -abs(phi)), abs(phi))  # Phi sigm(xi2)
     known = s.ah4 * u - s.ah5 * x1 - s.ah1 * x2
-    return (x2 + c.k1 * xi1 - pull * xi2,
-            known + s.ah5 * xi1 + (s.ah1 + c.k2) * xi2 + robust)
+    return (x2 + c.k1 * xi1 - pull * xi2, known + s.ah5 * xi1 + (s.ah1 + c.k2) * xi2 + robust)
 
 
 @layer
-def observe_printed(s: Any, c: Any, dt: float, x1_0: float, x2_0: float, u_0: float, x1: float,
-                    x2: float, u: float) -> None:
+def observe_printed(
+    s: Any, c: Any, dt: float, x1_0: float, x2_0: float, u_0: float, x1: float, x2: float, u: float
+) -> None:
     """
     Advance the observer (10), (11) by one Runge-Kutta step, as the printed method was simulated.
 
@@ -130,8 +149,11 @@ def observe_printed(s: Any, c: Any, dt: float, x1_0: float, x2_0: float, u_0: fl
     room = max(STIFFEST / max(dt, SHORTEST) - c.k2 - s.ah1, 0.0)
     x1_m, x2_m = 0.5 * (x1_0 + x1), 0.5 * (x2_0 + x2)
     u_m, phi_m = 0.5 * (u_0 + u), 0.5 * (phi_0 + s.phi)
-    g_0, g_m, g_1 = (min(max(steep * phi_0, -room), room), min(max(steep * phi_m, -room), room),
-                     min(max(steep * s.phi, -room), room))
+    g_0, g_m, g_1 = (
+        min(max(steep * phi_0, -room), room),
+        min(max(steep * phi_m, -room), room),
+        min(max(steep * s.phi, -room), room),
+    )
     xh1, xh2 = s.xh1, s.xh2
     e1, e2 = x1_m - xh1, x2_m - xh2
     p1, p2 = slopes(s, c, pull, g_0, phi_0, x1_0, x2_0, u_0, x1_0 - xh1, x2_0 - xh2)

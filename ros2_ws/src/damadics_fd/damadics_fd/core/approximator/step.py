@@ -11,17 +11,48 @@ from damadics_fd.core import quality
 from damadics_fd.core.approximator import learning, observer, velocity
 from damadics_fd.core.jit import jit, layer
 from damadics_fd.core.modes import MONITOR, PAPER, PHASE_PAPER
+from damadics_fd.core.valve import force
 
 SUBSTEPS = 1000  # at most, in one gap
 LARGEST_K2_DT = 1.5  # step of the printed observer, which is unstable from 2.8 on
-ESTIMATE = np.dtype((np.record, np.dtype([
-    ('stamp', 'i8'), ('x2', 'f8'), ('x1_hat', 'f8'), ('x2_hat', 'f8'), ('xi1', 'f8'),
-    ('xi2', 'f8'), ('phi', 'f8'), ('alpha1', 'f8'), ('alpha4', 'f8'), ('alpha5', 'f8'),
-    ('x1', 'f8'), ('u', 'f8'), ('ps', 'f8'), ('dp', 'f8'), ('progress', 'f8'), ('phase', 'i8'),
-])))
-STATE = np.dtype((np.record, np.dtype([
-    *learning.STATE, *velocity.STATE, *observer.STATE,
-], align=True)))
+ESTIMATE = np.dtype(
+    (
+        np.record,
+        np.dtype(
+            [
+                ('stamp', 'i8'),
+                ('x2', 'f8'),
+                ('x1_hat', 'f8'),
+                ('x2_hat', 'f8'),
+                ('xi1', 'f8'),
+                ('xi2', 'f8'),
+                ('phi', 'f8'),
+                ('alpha1', 'f8'),
+                ('alpha4', 'f8'),
+                ('alpha5', 'f8'),
+                ('x1', 'f8'),
+                ('u', 'f8'),
+                ('ps', 'f8'),
+                ('dp', 'f8'),
+                ('progress', 'f8'),
+                ('phase', 'i8'),
+            ]
+        ),
+    )
+)
+STATE = np.dtype(
+    (
+        np.record,
+        np.dtype(
+            [
+                *learning.STATE,
+                *velocity.STATE,
+                *observer.STATE,
+            ],
+            align=True,
+        ),
+    )
+)
 LEARNED = ('ah1', 'ah4', 'ah5', 'w1', 'w2', 'eps1', 'b1', 'base', 'theta', 'cov', 'sigma')
 
 
@@ -56,8 +87,18 @@ class Estimate(NamedTuple):
 
 
 @layer
-def advance(s: Any, c: Any, phase: int, dt: float, x1_0: float, x2_0: float, u_0: float,
-            x1: float, x2: float, u: float) -> None:
+def advance(
+    s: Any,
+    c: Any,
+    phase: int,
+    dt: float,
+    x1_0: float,
+    x2_0: float,
+    u_0: float,
+    x1: float,
+    x2: float,
+    u: float,
+) -> None:
     """
     Advance observer and, where the phase allows it, adaptation by one step.
 
@@ -80,8 +121,20 @@ def advance(s: Any, c: Any, phase: int, dt: float, x1_0: float, x2_0: float, u_0
 
 
 @jit
-def step(q: Any, s: Any, c: Any, e: Any, stamp: int, cv: float, x1: float, p1: float, p2: float,
-         t1: float, flow: float, ps: float) -> int:
+def step(
+    q: Any,
+    s: Any,
+    c: Any,
+    e: Any,
+    stamp: int,
+    cv: float,
+    x1: float,
+    p1: float,
+    p2: float,
+    t1: float,
+    flow: float,
+    ps: float,
+) -> int:
     """
     Take one sample.
 
@@ -169,8 +222,20 @@ def step(q: Any, s: Any, c: Any, e: Any, stamp: int, cv: float, x1: float, p1: f
 
 
 @jit
-def update(q: NDArray, s: NDArray, c: NDArray, e: NDArray, stamp: int, cv: float, x1: float,
-           p1: float, p2: float, t1: float, flow: float, ps: float) -> int:
+def update(
+    q: NDArray,
+    s: NDArray,
+    c: NDArray,
+    e: NDArray,
+    stamp: int,
+    cv: float,
+    x1: float,
+    p1: float,
+    p2: float,
+    t1: float,
+    flow: float,
+    ps: float,
+) -> int:
     """
     Take one sample; `step` for arrays of length 1, to be called from Python.
 

@@ -13,9 +13,22 @@ from typing import Any
 from damadics_fd.core.jit import jit
 
 HIGH_PASS, KALMAN, SUPER_TWISTING = range(3)
-STATE = [('y', 'f8'), ('v', 'f8'), ('y_raw', 'f8'), ('y_lag', 'f8'), ('u_raw', 'f8'),
-         ('uy', 'f8'), ('uv', 'f8'), ('dt', 'f8'), ('gain', 'f8'), ('gain_v', 'f8'),
-         ('lag', 'f8'), ('x1', 'f8'), ('x2', 'f8'), ('u', 'f8')]
+STATE = [
+    ('y', 'f8'),
+    ('v', 'f8'),
+    ('y_raw', 'f8'),
+    ('y_lag', 'f8'),
+    ('u_raw', 'f8'),
+    ('uy', 'f8'),
+    ('uv', 'f8'),
+    ('dt', 'f8'),
+    ('gain', 'f8'),
+    ('gain_v', 'f8'),
+    ('lag', 'f8'),
+    ('x1', 'f8'),
+    ('x2', 'f8'),
+    ('u', 'f8'),
+]
 
 
 @jit

@@ -9,24 +9,52 @@ from damadics_fd.core.jit import jit
 from damadics_fd.core.modes import PHASE_HOLD
 
 # transitions, numbered as in damadics_msgs/FaultEvent
-TRANSITIONS = ('raised', 'cleared', 'acknowledged', 'reset', 'shelved', 'unshelved', 'near_miss',
-               'changed')
+TRANSITIONS = (
+    'raised',
+    'cleared',
+    'acknowledged',
+    'reset',
+    'shelved',
+    'unshelved',
+    'near_miss',
+    'changed',
+)
 RAISED, CLEARED, ACKNOWLEDGED, RESET, SHELVED, UNSHELVED, NEAR_MISS, CHANGED = range(8)
 
 # states and NAMUR NE 107 levels, numbered as in damadics_msgs/FaultFlag
 STATES = ('not_monitoring', 'learning', 'healthy', 'alarm', 'latched', 'shelved')
-(STATE_NOT_MONITORING, STATE_LEARNING, STATE_HEALTHY, STATE_ALARM, STATE_LATCHED,
- STATE_SHELVED) = range(6)
+(
+    STATE_NOT_MONITORING,
+    STATE_LEARNING,
+    STATE_HEALTHY,
+    STATE_ALARM,
+    STATE_LATCHED,
+    STATE_SHELVED,
+) = range(6)
 NORMAL, MAINTENANCE_REQUIRED, OUT_OF_SPECIFICATION, FUNCTION_CHECK, FAILURE = range(5)
 NE107 = ('normal', 'maintenance required', 'out of specification', 'function check', 'failure')
 
 RECENT = 16  # alarms remembered for the chatter count
 MINUTE = 60_000_000_000
 STATE = [
-    ('stamp', 'i8'), ('active', '?'), ('latched', '?'), ('acknowledged', '?'), ('flag', '?'),
-    ('worst', 'i8'), ('occurrence', 'i8'), ('since', 'i8'), ('onset', 'i8'), ('peak', 'f8'),
-    ('pending', 'i8'), ('last_decision', 'i8'), ('excursion', 'i8'), ('excursion_peak', 'f8'),
-    ('near_misses', 'i8'), ('chatter', '?'), ('recent', 'i8', (RECENT,)), ('shelved_until', 'i8'),
+    ('stamp', 'i8'),
+    ('active', '?'),
+    ('latched', '?'),
+    ('acknowledged', '?'),
+    ('flag', '?'),
+    ('worst', 'i8'),
+    ('occurrence', 'i8'),
+    ('since', 'i8'),
+    ('onset', 'i8'),
+    ('peak', 'f8'),
+    ('pending', 'i8'),
+    ('last_decision', 'i8'),
+    ('excursion', 'i8'),
+    ('excursion_peak', 'f8'),
+    ('near_misses', 'i8'),
+    ('chatter', '?'),
+    ('recent', 'i8', (RECENT,)),
+    ('shelved_until', 'i8'),
 ]
 NEVER = -1
 LONGEST_SHELF = 30 * 86400.0  # s
@@ -133,8 +161,9 @@ def judge(a: Any, c: Any, stamp: int, exceed: bool, busy: bool, level: int, rati
 
 
 @jit
-def step(a: Any, c: Any, stamp: int, armed: bool, exceed: bool, busy: bool, level: int,
-         ratio: float) -> int:
+def step(
+    a: Any, c: Any, stamp: int, armed: bool, exceed: bool, busy: bool, level: int, ratio: float
+) -> int:
     """
     Take one decision.
 
@@ -244,8 +273,11 @@ def reset(a: Any) -> Answer:
     :return: the answer; refused while the condition lasts.
     """
     if a.active:
-        return Answer(False, f'alarm {a.occurrence} is still active; shelve it for the time of '
-                      'the repair and reset it when its condition has gone')
+        return Answer(
+            False,
+            f'alarm {a.occurrence} is still active; shelve it for the time of '
+            'the repair and reset it when its condition has gone',
+        )
     if not a.latched:
         return Answer(False, 'there is no alarm to reset')
     seen = 0 if a.acknowledged else 1 << ACKNOWLEDGED
@@ -264,8 +296,9 @@ def shelve(a: Any, seconds: float) -> Answer:
     :return: the answer; refused for a time that is not positive or longer than 30 days.
     """
     if not 0.0 < seconds <= LONGEST_SHELF:
-        return Answer(False, f'cannot shelve for {seconds:g} s: give 0 < seconds <= '
-                      f'{LONGEST_SHELF:.0f}')
+        return Answer(
+            False, f'cannot shelve for {seconds:g} s: give 0 < seconds <= {LONGEST_SHELF:.0f}'
+        )
     a.shelved_until = max(a.stamp, 0) + math.ceil(seconds * 1e9)
     refresh(a)
     return Answer(True, f'alarms shelved for {seconds:g} s', 1 << SHELVED)

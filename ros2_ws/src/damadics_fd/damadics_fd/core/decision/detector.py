@@ -89,8 +89,14 @@ class Detector:
         self.judge(ACCEPTED, self._estimate, self._decision)
         return self.decision
 
-    def judge(self, reason: NDArray[np.uint8], estimates: NDArray[Any], decisions: NDArray[Any],
-              keep: bool = True, first: int = 0) -> tuple[int, int]:
+    def judge(
+        self,
+        reason: NDArray[np.uint8],
+        estimates: NDArray[Any],
+        decisions: NDArray[Any],
+        keep: bool = True,
+        first: int = 0,
+    ) -> tuple[int, int]:
         """
         Judge a column of estimates.
 
@@ -103,8 +109,16 @@ class Detector:
         :return: the row after the last one, and the number of decisions with a transition.
         """
         done: tuple[int, int] = judge(
-            self.state, self._settings, self.signature.state, self.signature.record, reason,
-            estimates, decisions, keep, first)
+            self.state,
+            self._settings,
+            self.signature.state,
+            self.signature.record,
+            reason,
+            estimates,
+            decisions,
+            keep,
+            first,
+        )
         return done
 
     @property
@@ -125,8 +139,11 @@ class Detector:
         :return: `occurrences`, `near_misses`, and `chatter`: 1 while alarms follow too quickly.
         """
         s = self.state[0]
-        return {'occurrences': int(s.occurrence), 'near_misses': int(s.near_misses),
-                'chatter': int(s.chatter)}
+        return {
+            'occurrences': int(s.occurrence),
+            'near_misses': int(s.near_misses),
+            'chatter': int(s.chatter),
+        }
 
     def acknowledge(self, occurrence: int | None = None) -> Outcome:
         """
@@ -198,6 +215,7 @@ class Detector:
         return Outcome(answer.done, answer.text, tuple(self.decision.events))
 
     def _show(self, transitions: int) -> None:
-        show(self.state, self.signature.state, self.signature.record, self._estimate,
-             self._decision)
+        show(
+            self.state, self.signature.state, self.signature.record, self._estimate, self._decision
+        )
         self._decision['transitions'] = transitions

@@ -77,17 +77,32 @@ def events_of(decision: Any) -> tuple[Event, ...]:
 def _event(transition: int, d: Any) -> Event:
     strength, spread, confidence = known(d.strength, d.spread, d.confidence)
     duration = max(int(d.stamp) - int(d.onset), 0) * 1e-9 if d.onset else 0.0
-    return Event(transition, int(d.stamp), int(d.occurrence), int(d.level), int(d.onset),
-                 float(d.residual), float(d.threshold), float(d.peak), duration,
-                 CAUSES[int(d.cause)] if d.cause else '', confidence, strength, spread,
-                 text=_text(transition, d, duration), advice=_advice(transition, d))
+    return Event(
+        transition,
+        int(d.stamp),
+        int(d.occurrence),
+        int(d.level),
+        int(d.onset),
+        float(d.residual),
+        float(d.threshold),
+        float(d.peak),
+        duration,
+        CAUSES[int(d.cause)] if d.cause else '',
+        confidence,
+        strength,
+        spread,
+        text=_text(transition, d, duration),
+        advice=_advice(transition, d),
+    )
 
 
 def _text(transition: int, d: Any, duration: float) -> str:
     name = TRANSITIONS[transition].replace('_', ' ')
     number = '' if transition in (SHELVED, UNSHELVED, NEAR_MISS) else f' {int(d.occurrence)}'
-    text = (f'{name}{number}: velocity residual {float(d.ratio):.2f} x threshold '
-            f'({float(d.residual):.3g} / {float(d.threshold):.3g} 1/s)')
+    text = (
+        f'{name}{number}: velocity residual {float(d.ratio):.2f} x threshold '
+        f'({float(d.residual):.3g} / {float(d.threshold):.3g} 1/s)'
+    )
     if transition in (RAISED, CHANGED):
         text += f' for {duration:.3g} s, {NE107[int(d.level)]}'
     elif transition == CLEARED:

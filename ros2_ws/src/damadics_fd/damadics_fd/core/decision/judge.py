@@ -14,16 +14,50 @@ from damadics_fd.core.modes import PHASE_HOLD, PHASE_PAPER
 from damadics_fd.core.signature import step as signature_step
 
 LARGE = 1e9  # ratio to a threshold of zero
-DECISION = np.dtype((np.record, np.dtype([
-    ('stamp', 'i8'), ('residual', 'f8'), ('threshold', 'f8'), ('ratio', 'f8'), ('exceed', '?'),
-    ('fault', '?'), ('state', 'i8'), ('level', 'i8'), ('since', 'i8'), ('onset', 'i8'),
-    ('occurrence', 'i8'), ('acknowledged', '?'), ('peak', 'f8'), ('still', 'f8'),
-    ('cause', 'i8'), ('strength', 'f8'), ('spread', 'f8'), ('confidence', 'f8'),
-    ('transitions', 'i8'),
-], align=True)))
-STATE = np.dtype((np.record, np.dtype([
-    *vote.STATE, *alarm.STATE, ('place', 'f8'), ('moved', 'i8'), ('told', 'i8'),
-], align=True)))
+DECISION = np.dtype(
+    (
+        np.record,
+        np.dtype(
+            [
+                ('stamp', 'i8'),
+                ('residual', 'f8'),
+                ('threshold', 'f8'),
+                ('ratio', 'f8'),
+                ('exceed', '?'),
+                ('fault', '?'),
+                ('state', 'i8'),
+                ('level', 'i8'),
+                ('since', 'i8'),
+                ('onset', 'i8'),
+                ('occurrence', 'i8'),
+                ('acknowledged', '?'),
+                ('peak', 'f8'),
+                ('still', 'f8'),
+                ('cause', 'i8'),
+                ('strength', 'f8'),
+                ('spread', 'f8'),
+                ('confidence', 'f8'),
+                ('transitions', 'i8'),
+            ],
+            align=True,
+        ),
+    )
+)
+STATE = np.dtype(
+    (
+        np.record,
+        np.dtype(
+            [
+                *vote.STATE,
+                *alarm.STATE,
+                ('place', 'f8'),
+                ('moved', 'i8'),
+                ('told', 'i8'),
+            ],
+            align=True,
+        ),
+    )
+)
 STIR = 0.01  # of the stroke: less is no motion of the stem
 
 
@@ -54,8 +88,16 @@ def step(s: Any, c: Any, g: Any, gc: Any, e: Any, d: Any) -> None:
     ready = e.phase not in (PHASE_PAPER, PHASE_HOLD)
     signature_step.step(g, gc, e.stamp, e.x1, e.ps, e.dp, ready, s.active or s.latched)
     own = signature_step.own_level(g, gc)
-    d.transitions = alarm.step(s, c, e.stamp, armed or g.own != 0, exceed or own > 0,
-                               s.count[0] > 0, max(level, own), ratio)
+    d.transitions = alarm.step(
+        s,
+        c,
+        e.stamp,
+        armed or g.own != 0,
+        exceed or own > 0,
+        s.count[0] > 0,
+        max(level, own),
+        ratio,
+    )
     present = s.active or s.latched
     if g.cause != cause or not present:
         s.told = alarm.NORMAL
@@ -123,8 +165,17 @@ def report(s: Any, g: Any, gc: Any, e: Any, d: Any) -> None:
 
 
 @jit
-def judge(s: NDArray, c: NDArray, g: NDArray, gc: NDArray, reason: NDArray, e: NDArray,
-          d: NDArray, keep: bool, first: int) -> tuple[int, int]:
+def judge(
+    s: NDArray,
+    c: NDArray,
+    g: NDArray,
+    gc: NDArray,
+    reason: NDArray,
+    e: NDArray,
+    d: NDArray,
+    keep: bool,
+    first: int,
+) -> tuple[int, int]:
     """
     Judge estimates one after the other: live one of them, in a recording all.
 

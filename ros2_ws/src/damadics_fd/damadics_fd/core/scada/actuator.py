@@ -74,9 +74,7 @@ class Actuator:
         return values
 
 
-ACTUATOR = np.dtype(
-    (np.record, [(name, np.float64) for name in Actuator.__dataclass_fields__])
-)
+ACTUATOR = np.dtype((np.record, [(name, np.float64) for name in Actuator.__dataclass_fields__]))
 
 
 @jit
@@ -121,9 +119,16 @@ def density(t1: float, p1: float) -> Any:
 
 @jit
 def valve_flow(
-    act: Any, x: float, p1: float, p2: float, t1: float,
-    offset: float, scale: float, leak: float, bypass: float,
-) -> float:  # fmt: skip
+    act: Any,
+    x: float,
+    p1: float,
+    p2: float,
+    t1: float,
+    offset: float,
+    scale: float,
+    leak: float,
+    bypass: float,
+) -> float:
     """
     Return the flow through valve and bypass, t/h (benchmark 1.6).
 

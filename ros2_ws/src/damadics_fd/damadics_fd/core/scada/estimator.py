@@ -42,16 +42,26 @@ class ScadaEstimator(Estimator):
 
     def __init__(self, settings: Settings) -> None:
         actuator = Actuator(
-            stroke=settings.stroke, weight=settings.mass * settings.gravity, area=settings.area,
-            spring=settings.stiffness, compression=settings.preload * settings.stroke,
+            stroke=settings.stroke,
+            weight=settings.mass * settings.gravity,
+            area=settings.area,
+            spring=settings.stiffness,
+            compression=settings.preload * settings.stroke,
             plug_area=math.pi * settings.plug_diameter**2 / 4.0,
-        )  # fmt: skip
-        self.monitor = ScadaMonitor(ScadaSettings(
-            period_s=1.0 / min(settings.sample_rate, 1.0), t_on_s=settings.t_on,
-            learn_from_s=settings.t_w, learn_s=settings.t_learn, gap_s=settings.gap_reset,
-            settle_s=settings.hold, days_per_false_alarm=settings.false_alarm_days,
-            sigma=settings.sensor_noise, actuator=actuator,
-        ))  # fmt: skip
+        )
+        self.monitor = ScadaMonitor(
+            ScadaSettings(
+                period_s=1.0 / min(settings.sample_rate, 1.0),
+                t_on_s=settings.t_on,
+                learn_from_s=settings.t_w,
+                learn_s=settings.t_learn,
+                gap_s=settings.gap_reset,
+                settle_s=settings.hold,
+                days_per_false_alarm=settings.false_alarm_days,
+                sigma=settings.sensor_noise,
+                actuator=actuator,
+            )
+        )
         super().__init__(settings)
 
     def reset(self) -> None:
@@ -61,8 +71,17 @@ class ScadaEstimator(Estimator):
         self._ratio = self._residual = 0.0
         self.state['phase'] = PHASE_INIT
 
-    def update(self, stamp: int, cv: float, x1: float, p1: float, p2: float, t1: float,
-               flow: float, ps: float) -> Estimate | None:
+    def update(
+        self,
+        stamp: int,
+        cv: float,
+        x1: float,
+        p1: float,
+        p2: float,
+        t1: float,
+        flow: float,
+        ps: float,
+    ) -> Estimate | None:
         """
         Take one measurement; `t1` and `flow` may be NaN, `ps` is not used.
 
@@ -85,16 +104,31 @@ class ScadaEstimator(Estimator):
             self._residual = 0.0 if math.isnan(decision.r1) else decision.r1
             self._ratio = 0.0 if learning else decision.ratio
             self.state['phase'] = (
-                PHASE_LEARN_PHI if learning
-                else PHASE_MONITOR if decision.monitoring else PHASE_HOLD
-            )  # fmt: skip
+                PHASE_LEARN_PHI
+                if learning
+                else PHASE_MONITOR
+                if decision.monitoring
+                else PHASE_HOLD
+            )
         x = x1 + self.settings.preload
         return Estimate(
-            stamp=stamp, x2=math.nan, x1_hat=x - self._residual, x2_hat=math.nan,
-            xi1=self._residual, xi2=math.copysign(self._ratio, self._residual), phi=0.0,
-            alpha1=0.0, alpha4=0.0, alpha5=0.0, x1=x1, u=cv, ps=ps, dp=p1 - p2,
-            progress=self.monitor.progress, phase=int(self.state[0].phase),
-        )  # fmt: skip
+            stamp=stamp,
+            x2=math.nan,
+            x1_hat=x - self._residual,
+            x2_hat=math.nan,
+            xi1=self._residual,
+            xi2=math.copysign(self._ratio, self._residual),
+            phi=0.0,
+            alpha1=0.0,
+            alpha4=0.0,
+            alpha5=0.0,
+            x1=x1,
+            u=cv,
+            ps=ps,
+            dp=p1 - p2,
+            progress=self.monitor.progress,
+            phase=int(self.state[0].phase),
+        )
 
     @property
     def status(self) -> str:

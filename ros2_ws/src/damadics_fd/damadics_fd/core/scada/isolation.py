@@ -36,13 +36,24 @@ INCIPIENT_ONLY = frozenset({3, 4, 5, 6, 9})  # no physical background as abrupt 
 ABRUPT_PRIOR = 8.0  # nats against them after an abrupt onset
 EQUAL = 4.0  # nats within which two faults are not told apart
 NAMES = {
-    1: 'valve clogging', 2: 'plug or seat sedimentation', 3: 'plug or seat erosion',
-    4: 'valve or bushing friction', 5: 'external leakage', 6: 'internal leakage',
-    7: 'evaporation or critical flow', 9: 'servomotor housing leak', 10: 'diaphragm perforation',
-    11: 'servomotor spring', 12: 'electro-pneumatic transducer', 13: 'stem position sensor',
-    15: 'positioner feedback', 16: 'supply pressure drop', 17: 'pressure change across the valve',
-    18: 'bypass opened', 19: 'flow sensor',
-}  # fmt: skip
+    1: 'valve clogging',
+    2: 'plug or seat sedimentation',
+    3: 'plug or seat erosion',
+    4: 'valve or bushing friction',
+    5: 'external leakage',
+    6: 'internal leakage',
+    7: 'evaporation or critical flow',
+    9: 'servomotor housing leak',
+    10: 'diaphragm perforation',
+    11: 'servomotor spring',
+    12: 'electro-pneumatic transducer',
+    13: 'stem position sensor',
+    15: 'positioner feedback',
+    16: 'supply pressure drop',
+    17: 'pressure change across the valve',
+    18: 'bypass opened',
+    19: 'flow sensor',
+}
 GROUPS = {
     'medium': (7,),
     'pressures': (17,),
@@ -119,9 +130,7 @@ def group_of(fault: int) -> str:
 
 
 @jit
-def _stem_error(
-    window: np.ndarray, act: Any, fault: Any, stem: Any, late: bool
-) -> Any:
+def _stem_error(window: np.ndarray, act: Any, fault: Any, stem: Any, late: bool) -> Any:
     """Return the mean squared error of X' under a fault that is present in the whole window."""
     copy_stem(window[0].stem, stem)
     if late:  # the fault has been there for long: start from the position it has led to
@@ -132,7 +141,17 @@ def _stem_error(
     for i in range(window.shape[0]):
         e = window[i]
         x = advance_stem(
-            stem, act, fault, e.t0, e.t, e.cv0, e.cv, e.dp0, e.dp, e.slope0, e.slope,
+            stem,
+            act,
+            fault,
+            e.t0,
+            e.t,
+            e.cv0,
+            e.cv,
+            e.dp0,
+            e.dp,
+            e.slope0,
+            e.slope,
             COARSE_SUB_STEPS,
         )
         total += (e.x - x - e.correction) ** 2
@@ -140,9 +159,7 @@ def _stem_error(
 
 
 @jit
-def _flow_error(
-    window: np.ndarray, act: Any, fault: Any, g0: float, g1: float
-) -> float:
+def _flow_error(window: np.ndarray, act: Any, fault: Any, g0: float, g1: float) -> float:
     """Return the mean squared error of F' in units of its sigma; NaN where F' is not measured."""
     offset = 0.2 * fault.f2 - 0.1 * fault.f3
     scale = (1.0 - 0.2 * fault.f2) * (1.0 + 0.1 * fault.f3)
@@ -155,9 +172,16 @@ def _flow_error(
         if math.isnan(e.flow) or math.isnan(e.t1):
             continue
         flow = valve_flow(
-            act, e.x / sensor, e.p1 * P_RANGE, e.p2 * P_RANGE, e.t1 * T_RANGE,
-            offset, scale, 0.1 * fault.f6, fault.f18,
-        )  # fmt: skip
+            act,
+            e.x / sensor,
+            e.p1 * P_RANGE,
+            e.p2 * P_RANGE,
+            e.t1 * T_RANGE,
+            offset,
+            scale,
+            0.1 * fault.f6,
+            fault.f18,
+        )
         f = min(1.0, gain * (g0 + g1 * flow / F_RANGE))
         total += ((e.flow - f) / e.sq) ** 2
         n += 1
@@ -214,8 +238,10 @@ class Isolator:
         if abrupt:
             ranking = [
                 Hypothesis(h.fault, h.strength, h.cost + ABRUPT_PRIOR)
-                if h.fault in INCIPIENT_ONLY else h for h in ranking
-            ]  # fmt: skip
+                if h.fault in INCIPIENT_ONLY
+                else h
+                for h in ranking
+            ]
         ranking.sort(key=lambda h: h.cost)
         if shown:
             best = ranking[0].cost
@@ -302,9 +328,7 @@ class Isolator:
             grid = sorted({*grid, *(min(max(reached + d, 0.0), 1.0) for d in (-0.02, 0.0, 0.02))})
         return [(self.cost(window, fault, strength), strength) for strength in grid]
 
-    def _refine(
-        self, window: NDArray, fault: int, grid: list[tuple[float, float]]
-    ) -> Hypothesis:
+    def _refine(self, window: NDArray, fault: int, grid: list[tuple[float, float]]) -> Hypothesis:
         """Refine the best strength by golden section between its neighbours on the grid."""
         i = grid.index(min(grid))
         low, high = grid[max(i - 1, 0)][1], grid[min(i + 1, len(grid) - 1)][1]

@@ -54,9 +54,13 @@ class Prediction:
 
 @jit
 def _predict_record(
-    state: np.ndarray, settings: np.ndarray, reference: np.ndarray, samples: np.ndarray,
-    phi: np.ndarray, models: np.ndarray,
-) -> None:  # fmt: skip
+    state: np.ndarray,
+    settings: np.ndarray,
+    reference: np.ndarray,
+    samples: np.ndarray,
+    phi: np.ndarray,
+    models: np.ndarray,
+) -> None:
     s = state[0]
     for i in range(samples.shape[0]):
         r = samples[i]

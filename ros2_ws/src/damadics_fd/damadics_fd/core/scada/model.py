@@ -83,10 +83,19 @@ def transducer(cvi: float) -> float:
 
 @jit
 def advance_stem(
-    m: Any, act: Any, fault: Any,
-    t0: float, t1: float, cv0: float, cv1: float,
-    dp0: float, dp1: float, slope0: float, slope1: float, sub_steps: int = SUB_STEPS,
-) -> float:  # fmt: skip
+    m: Any,
+    act: Any,
+    fault: Any,
+    t0: float,
+    t1: float,
+    cv0: float,
+    cv1: float,
+    dp0: float,
+    dp1: float,
+    slope0: float,
+    slope1: float,
+    sub_steps: int = SUB_STEPS,
+) -> float:
     """
     Advance the stem from t0 to t1 and return its measured position, 0..1.
 

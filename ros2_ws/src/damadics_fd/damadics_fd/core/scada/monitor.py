@@ -66,12 +66,17 @@ def scada_samples(columns: Mapping[str, NDArray]) -> Floats:
     """
     n = len(columns['stamp'])
     missing = np.full(n, np.nan)
-    return np.column_stack([
-        columns['stamp'] / 1e9, columns['cv'], columns['x1'],
-        columns['p1'] / P_RANGE, columns['p2'] / P_RANGE,
-        columns.get('t1', missing) / T_RANGE,
-        columns.get('flow', missing) * (TPH_PER_KGS / F_RANGE),
-    ]).astype(np.float64)  # fmt: skip
+    return np.column_stack(
+        [
+            columns['stamp'] / 1e9,
+            columns['cv'],
+            columns['x1'],
+            columns['p1'] / P_RANGE,
+            columns['p2'] / P_RANGE,
+            columns.get('t1', missing) / T_RANGE,
+            columns.get('flow', missing) * (TPH_PER_KGS / F_RANGE),
+        ]
+    ).astype(np.float64)
 
 
 @jit
@@ -84,9 +89,12 @@ def usable(sample: np.ndarray, s: Any) -> Any:
 
 @jit
 def _run(
-    state: np.ndarray, settings: np.ndarray, reference: np.ndarray, samples: np.ndarray,
+    state: np.ndarray,
+    settings: np.ndarray,
+    reference: np.ndarray,
+    samples: np.ndarray,
     trace: np.ndarray,
-) -> int:  # fmt: skip
+) -> int:
     s = state[0]
     count = 0
     for i in range(samples.shape[0]):
@@ -107,9 +115,14 @@ def _run(
 
 @jit
 def _collect(
-    state: np.ndarray, settings: np.ndarray, samples: np.ndarray, start: int,
-    buffer: np.ndarray, filled: int, until: float,
-) -> tuple[int, int]:  # fmt: skip
+    state: np.ndarray,
+    settings: np.ndarray,
+    samples: np.ndarray,
+    start: int,
+    buffer: np.ndarray,
+    filled: int,
+    until: float,
+) -> tuple[int, int]:
     s = state[0]
     i = start
     while i < samples.shape[0] and filled < buffer.shape[0]:
@@ -203,9 +216,15 @@ class ScadaMonitor:
         return self._state[0]
 
     def update(
-        self, t: float, cv: float, x1: float, p1: float, p2: float,
-        t1: float = math.nan, flow: float = math.nan,
-    ) -> ScadaDecision | None:  # fmt: skip
+        self,
+        t: float,
+        cv: float,
+        x1: float,
+        p1: float,
+        p2: float,
+        t1: float = math.nan,
+        flow: float = math.nan,
+    ) -> ScadaDecision | None:
         """
         Take one measurement.
 
@@ -215,9 +234,9 @@ class ScadaMonitor:
         :param t1: temperature, degC; flow in kg/s; NaN where not measured.
         :return: the decision, or None where the sample was refused or thinned out.
         """
-        row = np.array([[
-            t, cv, x1, p1 / P_RANGE, p2 / P_RANGE, t1 / T_RANGE, flow * (TPH_PER_KGS / F_RANGE)
-        ]])  # fmt: skip
+        row = np.array(
+            [[t, cv, x1, p1 / P_RANGE, p2 / P_RANGE, t1 / T_RANGE, flow * (TPH_PER_KGS / F_RANGE)]]
+        )
         trace = self.run_samples(row)
         if not len(trace):
             return None
@@ -264,9 +283,7 @@ class ScadaMonitor:
             return None
         return Isolator(self._record[0], self.reference[0]).isolate(self.state)
 
-    def _learn_from(
-        self, samples: Floats, start: int, learned: NDArray
-    ) -> tuple[int, NDArray]:
+    def _learn_from(self, samples: Floats, start: int, learned: NDArray) -> tuple[int, NDArray]:
         room = self._filled + len(samples) - start
         if room > len(self._buffer):
             larger = np.empty((max(room, 2 * len(self._buffer), 4096), 7))

@@ -16,12 +16,33 @@ HISTORY_LENGTH = 1536
 HISTORY = np.dtype(
     (
         np.record,
-        [(name, np.float64) for name in (
-            't0', 't', 'cv0', 'cv', 'dp0', 'dp', 'slope0', 'slope',
-            'x', 'p1', 'p2', 't1', 'flow', 'correction', 'f', 'sq', 'r1', 'r2', 'xm',
-        )] + [('stem', STEM), ('masked', np.bool_)],
+        [
+            (name, np.float64)
+            for name in (
+                't0',
+                't',
+                'cv0',
+                'cv',
+                'dp0',
+                'dp',
+                'slope0',
+                'slope',
+                'x',
+                'p1',
+                'p2',
+                't1',
+                'flow',
+                'correction',
+                'f',
+                'sq',
+                'r1',
+                'r2',
+                'xm',
+            )
+        ]
+        + [('stem', STEM), ('masked', np.bool_)],
     )
-)  # fmt: skip
+)
 
 REFERENCE = np.dtype(
     (

@@ -47,9 +47,17 @@ def restart(s: Any, cfg: Any, t: float, cv: float, p1: float, p2: float) -> None
 
 @jit
 def predict(
-    s: Any, cfg: Any, ref: Any,
-    t: float, cv: float, x: float, p1: float, p2: float, t1: float, flow: float,
-) -> None:  # fmt: skip
+    s: Any,
+    cfg: Any,
+    ref: Any,
+    t: float,
+    cv: float,
+    x: float,
+    p1: float,
+    p2: float,
+    t1: float,
+    flow: float,
+) -> None:
     """
     Bring filter, models and regressors to the sample at t (sheet steps 1, 2, 4).
 
@@ -149,9 +157,7 @@ def predict(
 
 
 @jit
-def predict_flow(
-    s: Any, cfg: Any, ref: Any, x: float, t1: float, flow: float
-) -> None:
+def predict_flow(s: Any, cfg: Any, ref: Any, x: float, t1: float, flow: float) -> None:
     """Predict F' from the valve equation, with the sigma that follows from the sensors' noise."""
     s.f = math.nan
     s.sq = 1.0
@@ -162,8 +168,7 @@ def predict_flow(
     p2 = s.p_hat[1]
     s.f = nominal_flow(cfg.act, x, p1, p2, t1)
     fx = (
-        nominal_flow(cfg.act, x + 0.002, p1, p2, t1)
-        - nominal_flow(cfg.act, x - 0.002, p1, p2, t1)
+        nominal_flow(cfg.act, x + 0.002, p1, p2, t1) - nominal_flow(cfg.act, x - 0.002, p1, p2, t1)
     ) / 0.004
     fp = s.f / (2.0 * max(p1 - p2, 0.02))
     c = ref.pressure[0].c + ref.pressure[1].c
@@ -258,17 +263,23 @@ def accepts(s: Any, cfg: Any, t: float) -> bool:
     """Tell whether a sample at t is due, thinning faster input to the monitor's period."""
     interval = t - s.t_raw
     s.t_raw = t
-    due: bool = s.samples == 0 or t - s.t >= (
-        cfg.period_s - 0.5 * min(interval, cfg.period_s)
-    )
+    due: bool = s.samples == 0 or t - s.t >= (cfg.period_s - 0.5 * min(interval, cfg.period_s))
     return due
 
 
 @jit
 def step(
-    s: Any, cfg: Any, ref: Any,
-    t: float, cv: float, x: float, p1: float, p2: float, t1: float, flow: float,
-) -> None:  # fmt: skip
+    s: Any,
+    cfg: Any,
+    ref: Any,
+    t: float,
+    cv: float,
+    x: float,
+    p1: float,
+    p2: float,
+    t1: float,
+    flow: float,
+) -> None:
     """Take one accepted sample, scaled to 0..1, through prediction, residuals and tests."""
     predict(s, cfg, ref, t, cv, x, p1, p2, t1, flow)
     residuals(s, ref, x, t1, flow)

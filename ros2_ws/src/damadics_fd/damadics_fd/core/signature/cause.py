@@ -122,8 +122,10 @@ def decide(s: Any, c: Any) -> None:
                 name_friction(s, c, m, p_f)
         elif s.family == FAMILY_ELASTIC and p_f < 0.5:
             name_elastic(s, c, m, 1.0 - p_f)
-    elif s.r_max > NULL_STICK * s.r_ref and s.n_alarm >= NULL_MOVING and moving_unchanged(
-        s, c, D - 2.0 * b_r
+    elif (
+        s.r_max > NULL_STICK * s.r_ref
+        and s.n_alarm >= NULL_MOVING
+        and moving_unchanged(s, c, D - 2.0 * b_r)
     ):
         s.run_e = 0
         s.run_f += 1

@@ -112,7 +112,11 @@ def cross_information(s: Any, m: int, iv: float, i: int, j: int) -> float:
 
 @jit
 def solve_group(
-    s: Any, m: int, iv: float, columns: NDArray[np.int64], count: int,
+    s: Any,
+    m: int,
+    iv: float,
+    columns: NDArray[np.int64],
+    count: int,
     prior: tuple[float, float, float, float],
 ) -> float:
     """
@@ -190,8 +194,9 @@ def evaluate(s: Any, c: Any, m: int, eps: float, b_r: float, b_p: float) -> floa
     now = growth_time(s)
     # friction: dry and viscous part together
     count = 3 if m == SET_ALARM else 2
-    explained = solve_group(s, m, iv, FRICTION_COLUMNS, count,
-                            (c.change_std[1], c.change_std[0], c.growth_std[0], 1.0))
+    explained = solve_group(
+        s, m, iv, FRICTION_COLUMNS, count, (c.change_std[1], c.change_std[0], c.growth_std[0], 1.0)
+    )
     v_mean = s.vb[m] / ne
     scale = max(s.theta[SIGN] + s.theta[V] * v_mean, SMALL_FRICTION)
     logp[FRICTION] = J_0 - explained
@@ -199,8 +204,9 @@ def evaluate(s: Any, c: Any, m: int, eps: float, b_r: float, b_p: float) -> floa
     if value[FRICTION] < -1.3 - SMALL / scale:
         logp[FRICTION] = J_0  # friction cannot become negative
     # spring
-    explained = solve_group(s, m, iv, SPRING_COLUMNS, count - 1,
-                            (c.change_std[2], c.growth_std[1], 1.0, 1.0))
+    explained = solve_group(
+        s, m, iv, SPRING_COLUMNS, count - 1, (c.change_std[2], c.growth_std[1], 1.0, 1.0)
+    )
     logp[SPRING] = J_0 - explained
     value[SPRING], std[SPRING] = combine(s, count - 1, now, 0.0, s.theta[X1])
     if value[SPRING] < -1.05:

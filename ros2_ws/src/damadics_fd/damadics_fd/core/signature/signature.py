@@ -134,10 +134,16 @@ class Signature:
             state[name][0] = given
             if not np.isfinite(state[name]).all():
                 raise ValueError(f'signature reference: {name} is not finite')
-        if not (state['sigma'][0] > 0.0 and state['r_ref'][0] > 0.0 and state['kappa'][0] >= 1.0
-                and state['unit'][0, X1] > 0.0 and state['unit_weight'][0] > 0.0):
+        if not (
+            state['sigma'][0] > 0.0
+            and state['r_ref'][0] > 0.0
+            and state['kappa'][0] >= 1.0
+            and state['unit'][0, X1] > 0.0
+            and state['unit_weight'][0] > 0.0
+        ):
             raise ValueError(
-                'signature reference: sigma, r_ref, kappa, stiffness and weight must be positive')
+                'signature reference: sigma, r_ref, kappa, stiffness and weight must be positive'
+            )
         state['state'] = STATE_MONITOR if state['verified'][0] else STATE_VERIFY
         state['index'] = -1
         state['n_learn'] = np.inf  # its sums are not kept: VERIFY only checks it
@@ -150,6 +156,11 @@ class Signature:
         s = self.state[0]
         value, std, confidence = known(s.cause_value, s.cause_std, s.confidence)
         return SignatureView(
-            int(s.state), int(s.family), CAUSES[int(s.cause)], value, std, confidence,
+            int(s.state),
+            int(s.family),
+            CAUSES[int(s.cause)],
+            value,
+            std,
+            confidence,
             CAUSES[int(s.second)] if s.cause == CAUSE_ELASTIC else 'none',
         )

@@ -49,14 +49,37 @@ FAMILY_UNDETERMINED, FAMILY_FRICTION, FAMILY_ELASTIC, FAMILY_UNCONFIRMED, FAMILY
 
 # -- causes: what a person is told ------------------------------------------------------------
 CAUSES = (
-    'none', 'undetermined', 'unconfirmed', 'friction_up', 'friction_down', 'stick_play',
-    'elastic', 'spring_stiffer', 'spring_softer', 'preload', 'position_gain', 'pressure_gain',
-    'dp_offset', 'position_offset', 'supply',
+    'none',
+    'undetermined',
+    'unconfirmed',
+    'friction_up',
+    'friction_down',
+    'stick_play',
+    'elastic',
+    'spring_stiffer',
+    'spring_softer',
+    'preload',
+    'position_gain',
+    'pressure_gain',
+    'dp_offset',
+    'position_offset',
+    'supply',
 )
 (
-    CAUSE_NONE, CAUSE_UNDETERMINED, CAUSE_UNCONFIRMED, CAUSE_FRICTION_UP, CAUSE_FRICTION_DOWN,
-    CAUSE_STICK_PLAY, CAUSE_ELASTIC, CAUSE_SPRING_STIFFER, CAUSE_SPRING_SOFTER, CAUSE_PRELOAD,
-    CAUSE_POSITION_GAIN, CAUSE_PRESSURE_GAIN, CAUSE_DP_OFFSET, CAUSE_POSITION_OFFSET,
+    CAUSE_NONE,
+    CAUSE_UNDETERMINED,
+    CAUSE_UNCONFIRMED,
+    CAUSE_FRICTION_UP,
+    CAUSE_FRICTION_DOWN,
+    CAUSE_STICK_PLAY,
+    CAUSE_ELASTIC,
+    CAUSE_SPRING_STIFFER,
+    CAUSE_SPRING_SOFTER,
+    CAUSE_PRELOAD,
+    CAUSE_POSITION_GAIN,
+    CAUSE_PRESSURE_GAIN,
+    CAUSE_DP_OFFSET,
+    CAUSE_POSITION_OFFSET,
     CAUSE_SUPPLY,
 ) = range(len(CAUSES))
 
@@ -85,7 +108,18 @@ class SignatureSettings:
     plug_area: float = float(np.pi) * 0.05**2 / 4.0  # [m2]
     plug_x: tuple[float, ...] = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.99, 1.0)
     plug_km: tuple[float, ...] = (
-        1.0, 0.95, 0.90, 0.85, 0.785, 0.725, 0.67, 0.61, 0.555, 0.5, 0.45, 0.40,
+        1.0,
+        0.95,
+        0.90,
+        0.85,
+        0.785,
+        0.725,
+        0.67,
+        0.61,
+        0.555,
+        0.5,
+        0.45,
+        0.40,
     )  # [1] Km(X): plug force (P1 - P2) / Km * plug_area
     available: bool = True  # False: nothing is done
     sample_period: float = 0.005  # [s] nominal
@@ -154,17 +188,28 @@ class SignatureSettings:
         """
         c = settings
         return cls(
-            force_scale=c.stiffness * c.stroke, preload=c.preload, weight=c.mass * c.gravity,
-            diaphragm_area=c.area, plug_area=math.pi * c.plug_diameter**2 / 4.0,
-            plug_km=c.plug_table, stroke=c.stroke,
+            force_scale=c.stiffness * c.stroke,
+            preload=c.preload,
+            weight=c.mass * c.gravity,
+            diaphragm_area=c.area,
+            plug_area=math.pi * c.plug_diameter**2 / 4.0,
+            plug_km=c.plug_table,
+            stroke=c.stroke,
             theta_nominal=(1.0, 0.0, c.alpha1 / c.alpha4, cls.theta_nominal[SIGN]),
             sample_period=1.0 / c.sample_rate,
             available=c.signature and c.sample_rate >= MIN_RATE,
-            own_alarm=c.own_alarm, verify=c.verify, start=c.t_on, learn=c.t_learn,
-            plug_gain_std=c.plug_gain_std, plug_shape_std=c.plug_shape_std,
-            material_friction=c.material_friction, material_spring=c.material_spring,
-            material_supply=c.material_supply, supply_pressure=c.supply_pressure,
-            chamber_volume=c.chamber_volume, ne107=tuple(classes),
+            own_alarm=c.own_alarm,
+            verify=c.verify,
+            start=c.t_on,
+            learn=c.t_learn,
+            plug_gain_std=c.plug_gain_std,
+            plug_shape_std=c.plug_shape_std,
+            material_friction=c.material_friction,
+            material_spring=c.material_spring,
+            material_supply=c.material_supply,
+            supply_pressure=c.supply_pressure,
+            chamber_volume=c.chamber_volume,
+            ne107=tuple(classes),
         )
 
     def __post_init__(self) -> None:
@@ -190,8 +235,11 @@ def _record(pairs: list[Any]) -> np.dtype:
 def _settings_dtype() -> np.dtype:
     scalar = {float: 'f8', int: 'i8', bool: 'i8'}
     spec: list[Any] = [
-        ('block_ns', 'i8'), ('min_samples', 'i8'), ('plug_n', 'i8'),
-        ('plug_x', 'f8', (N_PLUG,)), ('plug_km', 'f8', (N_PLUG,)),
+        ('block_ns', 'i8'),
+        ('min_samples', 'i8'),
+        ('plug_n', 'i8'),
+        ('plug_x', 'f8', (N_PLUG,)),
+        ('plug_km', 'f8', (N_PLUG,)),
     ]
     default = SignatureSettings()
     for field in fields(SignatureSettings):
@@ -232,57 +280,121 @@ def settings_record(settings: SignatureSettings) -> NDArray[np.void]:
 
 # What a restarted node needs to go straight to MONITOR.
 REFERENCE_FIELDS: list[Any] = [
-    ('theta', 'f8', (N_REF,)), ('J0', 'f8', (N_REF, N_REF)), ('sigma', 'f8'), ('r_ref', 'f8'),
-    ('kappa', 'f8'), ('verified', 'i8'),
+    ('theta', 'f8', (N_REF,)),
+    ('J0', 'f8', (N_REF, N_REF)),
+    ('sigma', 'f8'),
+    ('r_ref', 'f8'),
+    ('kappa', 'f8'),
+    ('verified', 'i8'),
     # K b c Fc for stating sizes, their covariance, the blocks they rest on
-    ('unit', 'f8', (TABLE,)), ('unit_cov', 'f8', (TABLE, TABLE)), ('unit_weight', 'f8'),
-    ('air_learned', 'i8', (2,)), ('air_ref', 'f8', (2,)),
+    ('unit', 'f8', (TABLE,)),
+    ('unit_cov', 'f8', (TABLE, TABLE)),
+    ('unit_weight', 'f8'),
+    ('air_learned', 'i8', (2,)),
+    ('air_ref', 'f8', (2,)),
 ]
 REFERENCE_DTYPE = _record(REFERENCE_FIELDS)
 
 STATE_DTYPE = _record(
     REFERENCE_FIELDS
     + [
-        ('state', 'i8'), ('t0', 'i8'), ('t', 'i8'), ('since', 'i8'),
+        ('state', 'i8'),
+        ('t0', 'i8'),
+        ('t', 'i8'),
+        ('since', 'i8'),
         # block under construction
-        ('index', 'i8'), ('n', 'i8'), ('sx', 'f8'), ('su', 'f8'), ('sp', 'f8'), ('sg', 'f8'),
+        ('index', 'i8'),
+        ('n', 'i8'),
+        ('sx', 'f8'),
+        ('su', 'f8'),
+        ('sp', 'f8'),
+        ('sg', 'f8'),
         ('st', 'f8'),
         # the last three blocks, newest last
-        ('run', 'i8'), ('bx', 'f8', (3,)), ('bu', 'f8', (3,)), ('bp', 'f8', (3,)),
-        ('bdp', 'f8', (3,)), ('bt', 'f8', (3,)),
+        ('run', 'i8'),
+        ('bx', 'f8', (3,)),
+        ('bu', 'f8', (3,)),
+        ('bp', 'f8', (3,)),
+        ('bdp', 'f8', (3,)),
+        ('bt', 'f8', (3,)),
         # block under evaluation
-        ('moving', 'i8'), ('standing', 'i8'), ('slide', 'i8'), ('x', 'f8'), ('u', 'f8'),
-        ('v', 'f8'), ('w', 'f8'), ('ph', 'f8', (N_COL,)),
+        ('moving', 'i8'),
+        ('standing', 'i8'),
+        ('slide', 'i8'),
+        ('x', 'f8'),
+        ('u', 'f8'),
+        ('v', 'f8'),
+        ('w', 'f8'),
+        ('ph', 'f8', (N_COL,)),
         # LEARN
-        ('n_learn', 'f8'), ('n_up', 'i8'), ('n_down', 'i8'), ('x_low', 'f8'), ('x_high', 'f8'),
+        ('n_learn', 'f8'),
+        ('n_up', 'i8'),
+        ('n_down', 'i8'),
+        ('x_low', 'f8'),
+        ('x_high', 'f8'),
         ('n_moving', 'i8'),
         # accumulators
-        ('S', 'f8', (N_SETS, N_COL, N_COL)), ('q', 'f8', (N_SETS, N_COL)),
-        ('rr', 'f8', (N_SETS,)), ('ne', 'f8', (N_SETS,)), ('vb', 'f8', (N_SETS,)),
+        ('S', 'f8', (N_SETS, N_COL, N_COL)),
+        ('q', 'f8', (N_SETS, N_COL)),
+        ('rr', 'f8', (N_SETS,)),
+        ('ne', 'f8', (N_SETS,)),
+        ('vb', 'f8', (N_SETS,)),
         # evidence of each set: D, log posteriors, changes, standard deviations
-        ('D', 'f8', (N_SETS,)), ('due', 'i8', (N_SETS,)), ('over', 'i8', (N_SETS,)),
-        ('logp', 'f8', (N_SETS, N_HYP)), ('value', 'f8', (N_SETS, N_HYP)),
+        ('D', 'f8', (N_SETS,)),
+        ('due', 'i8', (N_SETS,)),
+        ('over', 'i8', (N_SETS,)),
+        ('logp', 'f8', (N_SETS, N_HYP)),
+        ('value', 'f8', (N_SETS, N_HYP)),
         ('sd', 'f8', (N_SETS, N_HYP)),
         ('d_max', 'f8', (N_SETS,)),
         # cues
-        ('stick', 'i8'), ('stick_x', 'f8'), ('stick_low', 'f8'), ('stick_high', 'f8'),
-        ('r_max', 'f8'), ('b_p_until', 'i8'),
+        ('stick', 'i8'),
+        ('stick_x', 'f8'),
+        ('stick_low', 'f8'),
+        ('stick_high', 'f8'),
+        ('r_max', 'f8'),
+        ('b_p_until', 'i8'),
         # alarm and decision
-        ('alarm_in', 'i8'), ('own', 'i8'), ('alarm_t', 'i8'), ('own_t', 'i8'), ('stage2', 'i8'),
-        ('n_alarm', 'f8'), ('run_f', 'i8'), ('run_e', 'i8'), ('family', 'i8'), ('cause', 'i8'),
-        ('second', 'i8'), ('cause_value', 'f8'), ('cause_std', 'f8'), ('confidence', 'f8'),
+        ('alarm_in', 'i8'),
+        ('own', 'i8'),
+        ('alarm_t', 'i8'),
+        ('own_t', 'i8'),
+        ('stage2', 'i8'),
+        ('n_alarm', 'f8'),
+        ('run_f', 'i8'),
+        ('run_e', 'i8'),
+        ('family', 'i8'),
+        ('cause', 'i8'),
+        ('second', 'i8'),
+        ('cause_value', 'f8'),
+        ('cause_std', 'f8'),
+        ('confidence', 'f8'),
         # changes now: spring, preload, friction (joint estimate over the slow set)
-        ('now', 'f8', (3,)), ('now_std', 'f8', (3,)), ('now_t', 'i8'),
+        ('now', 'f8', (3,)),
+        ('now_std', 'f8', (3,)),
+        ('now_t', 'i8'),
         # air supply
-        ('air_way', 'i8'), ('air_n', 'i8'), ('air_moved', 'f8'), ('air_top', 'f8'),
-        ('air_second', 'f8'), ('air_ps', 'f8'), ('air_count', 'i8', (2,)),
-        ('air_ring', 'f8', (2, STROKES)), ('air_ring_ps', 'f8', (2, STROKES)),
-        ('air_rate', 'f8', (2,)), ('air_rate_ps', 'f8', (2,)),
+        ('air_way', 'i8'),
+        ('air_n', 'i8'),
+        ('air_moved', 'f8'),
+        ('air_top', 'f8'),
+        ('air_second', 'f8'),
+        ('air_ps', 'f8'),
+        ('air_count', 'i8', (2,)),
+        ('air_ring', 'f8', (2, STROKES)),
+        ('air_ring_ps', 'f8', (2, STROKES)),
+        ('air_rate', 'f8', (2,)),
+        ('air_rate_ps', 'f8', (2,)),
         # work space of the compiled functions
         # a stack of one matrix: numba types its members alike, whatever their size
-        ('L', 'f8', (1, N_REF, N_REF)), ('Y', 'f8', (1, N_REF, N_COL)), ('y0', 'f8', (N_REF,)),
-        ('Gm', 'f8', (1, N_COL, N_COL)), ('gv', 'f8', (N_COL,)), ('H', 'f8', (1, N_FIT, N_FIT)),
-        ('W', 'f8', (1, N_FIT, N_FIT)), ('d', 'f8', (N_FIT,)),
+        ('L', 'f8', (1, N_REF, N_REF)),
+        ('Y', 'f8', (1, N_REF, N_COL)),
+        ('y0', 'f8', (N_REF,)),
+        ('Gm', 'f8', (1, N_COL, N_COL)),
+        ('gv', 'f8', (N_COL,)),
+        ('H', 'f8', (1, N_FIT, N_FIT)),
+        ('W', 'f8', (1, N_FIT, N_FIT)),
+        ('d', 'f8', (N_FIT,)),
     ]
 )
 

@@ -65,9 +65,7 @@ QUIET, BLOCK, CHANGED = 0, 1, 2  # what a step returns: nothing new, a block, a 
 
 
 @jit
-def step(
-    s: Any, c: Any, t: int, x: float, ps: float, dp: float, ready: bool, alarm: bool
-) -> int:
+def step(s: Any, c: Any, t: int, x: float, ps: float, dp: float, ready: bool, alarm: bool) -> int:
     """
     Take one accepted sample; its arguments are those of `Signature.update`.
 
@@ -219,8 +217,13 @@ def judge(s: Any, c: Any) -> int:
             decide(s, c)
         if s.state == STATE_VERIFY:
             finish_verification(s, c)
-        elif (air and s.state == STATE_MONITOR and c.own_alarm != 0 and supply_lost(s, c)
-              and strokes_agree(s)):
+        elif (
+            air
+            and s.state == STATE_MONITOR
+            and c.own_alarm != 0
+            and supply_lost(s, c)
+            and strokes_agree(s)
+        ):
             start_supply_alarm(s, c)
     return CHANGED if s.state * 10000 + s.family * 100 + s.cause != before else BLOCK
 

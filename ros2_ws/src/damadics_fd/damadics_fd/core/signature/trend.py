@@ -68,8 +68,11 @@ class Trend:
         left = way * (limit - value)
         speed = way * self.slope
         expected = 0.0 if left <= 0.0 else left / speed if speed > 0.0 else math.inf
-        return TimeToLimit(expected, self._crossing(limit, now, way, sigmas),
-                           self._crossing(limit, now, way, -sigmas))
+        return TimeToLimit(
+            expected,
+            self._crossing(limit, now, way, sigmas),
+            self._crossing(limit, now, way, -sigmas),
+        )
 
     def _crossing(self, limit: float, now: float, way: float, sigmas: float) -> float:
         """Find where line + sigmas * std first meets the limit, by its quadratic equation."""
@@ -105,8 +108,13 @@ def fit_line(t: ArrayLike, value: ArrayLike, std: ArrayLike) -> Trend | None:
     line, chi2 = _weighted_line(x, y, s)
     inflation = max(1.0, chi2)
     v = line.variance
-    return Trend(line.origin, line.level, line.slope,
-                 (v[0] * inflation, v[1] * inflation, v[2] * inflation), line.points)
+    return Trend(
+        line.origin,
+        line.level,
+        line.slope,
+        (v[0] * inflation, v[1] * inflation, v[2] * inflation),
+        line.points,
+    )
 
 
 def fit_recent(t: ArrayLike, value: ArrayLike, std: ArrayLike) -> Trend | None:
@@ -134,8 +142,9 @@ def fit_recent(t: ArrayLike, value: ArrayLike, std: ArrayLike) -> Trend | None:
     return best
 
 
-def _weighted_line(x: NDArray[np.float64], y: NDArray[np.float64],
-                   s: NDArray[np.float64]) -> tuple[Trend, float]:
+def _weighted_line(
+    x: NDArray[np.float64], y: NDArray[np.float64], s: NDArray[np.float64]
+) -> tuple[Trend, float]:
     w = 1.0 / (s * s)
     total = w.sum()
     origin = float(w @ x / total)  # here level and slope are uncorrelated
