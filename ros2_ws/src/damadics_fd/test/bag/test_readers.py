@@ -15,8 +15,7 @@ from damadics_fd.bag.cdr.definition import schema_text, type_hash
 from damadics_fd.bag.inspection import WHOLE, inspect
 from damadics_fd.commands.replay.replay import main
 
-from .bag_support import MEASUREMENT, SIGNALS, needs_messages, simulated
-from .test_bag_replay import stroke
+from .bag_support import MEASUREMENT, SIGNALS, needs_messages, simulated, stroke
 
 pytestmark = needs_messages
 
