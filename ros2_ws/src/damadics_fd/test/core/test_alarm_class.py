@@ -21,7 +21,7 @@ from damadics_fd.core.pipeline import Result, run
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.signature.state import CAUSES, SignatureSettings
 
-from .test_core_alarm import Valve
+from .test_alarm import Valve
 
 SPRING = CAUSES.index('spring_softer')
 FRICTION = CAUSES.index('friction_up')
