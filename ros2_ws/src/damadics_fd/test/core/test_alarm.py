@@ -196,6 +196,20 @@ def test_alarm_survives_a_restart():  # AM-7
         lambda s: s.update(peak=math.inf),
         lambda s: s.update(recent=[1, 2]),
         lambda s: s.update(occurrence=2**70),
+        lambda s: s.update(occurrence=-1),
+        lambda s: s.update(occurrence=2**32),
+        lambda s: s.update(occurrence=1.5),
+        lambda s: s.update(occurrence=0),
+        lambda s: s.update(active='yes'),
+        lambda s: s.update(active=1),
+        lambda s: s.update(latched=False),
+        lambda s: s.update(flag=False),
+        lambda s: s.update(worst=4),
+        lambda s: s.update(shelved_until=2**62),
+        lambda s: s.update(shelved_until=31 * 86400 * 10**9),
+        lambda s: s.update(since=2**63 - 1),
+        lambda s: s.update(recent=[True] * 16),
+        lambda s: s.update(told=9),
     ],
 )
 def test_damaged_alarm_state_is_refused_whole(damage):
@@ -207,6 +221,44 @@ def test_damaged_alarm_state_is_refused_whole(damage):
     with pytest.raises(ValueError):
         valve.detector.load(saved)
     assert valve.detector.save() == before
+
+
+def test_an_alarm_state_of_0_1_is_taken_up():
+    valve = Valve()
+    valve.feed(1.7, 1.0)
+    saved = valve.detector.save()
+    del saved['unknown']
+    again = Valve()
+    again.detector.load(saved)
+    assert again.detector.decision.fault
+
+
+@pytest.mark.parametrize('confirm', ['acknowledge', 'reset_alarm'])
+def test_a_lost_alarm_is_shown_as_lost_until_a_person_has_seen_it(confirm):
+    valve = Valve()
+    valve.detector.lose()
+    assert valve.detector.decision.state == alarm.STATE_UNKNOWN
+    decision = valve.feed(0.1, 1.0)
+    assert (decision.state, decision.fault) == (alarm.STATE_UNKNOWN, False)
+    assert decision.level == alarm.FUNCTION_CHECK
+    again = Valve()
+    again.detector.load(json.loads(json.dumps(valve.detector.save())))
+    assert again.detector.decision.state == alarm.STATE_UNKNOWN, 'a restart is no confirmation'
+    outcome = getattr(valve.detector, confirm)()
+    assert outcome.done
+    assert [event.name for event in outcome.events] == ['acknowledged']
+    assert valve.feed(0.1, 0.1).state == alarm.STATE_HEALTHY
+    assert not getattr(valve.detector, confirm)().done
+
+
+def test_a_new_alarm_is_shown_above_a_lost_one():
+    valve = Valve()
+    valve.detector.lose()
+    assert valve.feed(1.7, 1.0).state == STATE_ALARM
+    assert valve.detector.acknowledge().done
+    assert valve.feed(0.1, 6.0).state == STATE_LATCHED
+    assert valve.detector.reset_alarm().done
+    assert valve.feed(0.1, 0.1).state == alarm.STATE_HEALTHY, 'a person was there'
 
 
 def test_alarm_stays_while_the_detector_does_not_monitor():

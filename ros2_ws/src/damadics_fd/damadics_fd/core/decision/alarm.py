@@ -22,7 +22,15 @@ TRANSITIONS = (
 RAISED, CLEARED, ACKNOWLEDGED, RESET, SHELVED, UNSHELVED, NEAR_MISS, CHANGED = range(8)
 
 # states and NAMUR NE 107 levels, numbered as in damadics_msgs/FaultFlag
-STATES = ('not_monitoring', 'learning', 'healthy', 'alarm', 'latched', 'shelved')
+STATES = (
+    'not_monitoring',
+    'learning',
+    'healthy',
+    'alarm',
+    'latched',
+    'shelved',
+    'unknown',
+)
 (
     STATE_NOT_MONITORING,
     STATE_LEARNING,
@@ -30,7 +38,8 @@ STATES = ('not_monitoring', 'learning', 'healthy', 'alarm', 'latched', 'shelved'
     STATE_ALARM,
     STATE_LATCHED,
     STATE_SHELVED,
-) = range(6)
+    STATE_UNKNOWN,
+) = range(7)
 NORMAL, MAINTENANCE_REQUIRED, OUT_OF_SPECIFICATION, FUNCTION_CHECK, FAILURE = range(5)
 NE107 = ('normal', 'maintenance required', 'out of specification', 'function check', 'failure')
 
@@ -55,6 +64,7 @@ STATE = [
     ('chatter', '?'),
     ('recent', 'i8', (RECENT,)),
     ('shelved_until', 'i8'),
+    ('unknown', '?'),  # the alarm of before a restart is lost
 ]
 NEVER = -1
 LONGEST_SHELF = 30 * 86400.0  # s
@@ -228,6 +238,8 @@ def state_of(a: Any, armed: bool, phase: int) -> int:
         return STATE_ALARM
     if a.latched:
         return STATE_LATCHED
+    if a.unknown:
+        return STATE_UNKNOWN
     if armed:
         return STATE_HEALTHY
     return STATE_NOT_MONITORING if phase == PHASE_HOLD else STATE_LEARNING
@@ -240,11 +252,11 @@ def level_of(a: Any, armed: bool) -> int:
 
     :param a: alarm record.
     :param armed: decisions count.
-    :return: a level; function check while shelved, learning or not monitoring.
+    :return: a level; function check while shelved, unknown, learning or not monitoring.
     """
     if a.flag:
         return severity(a.worst)
-    return FUNCTION_CHECK if a.shelved_until > 0 or not armed else NORMAL
+    return FUNCTION_CHECK if a.shelved_until > 0 or a.unknown or not armed else NORMAL
 
 
 def acknowledge(a: Any, occurrence: int | None = None) -> Answer:
@@ -256,13 +268,25 @@ def acknowledge(a: Any, occurrence: int | None = None) -> Answer:
     :return: the answer; acknowledging twice is no error and no transition.
     """
     if not (a.active or a.latched):
-        return Answer(False, 'there is no alarm to acknowledge')
+        if not a.unknown:
+            return Answer(False, 'there is no alarm to acknowledge')
+        a.unknown = False
+        return Answer(True, 'noted that the alarm of before is lost', 1 << ACKNOWLEDGED)
     if occurrence is not None and occurrence != a.occurrence:
         return Answer(False, f'there is no alarm {occurrence}; the present one is {a.occurrence}')
     if a.acknowledged:
         return Answer(True, f'alarm {a.occurrence} was acknowledged before')
     a.acknowledged = True
     return Answer(True, f'alarm {a.occurrence} acknowledged', 1 << ACKNOWLEDGED)
+
+
+def lose(a: Any) -> None:
+    """
+    Begin without the alarm of before, which nobody can tell; until a person says otherwise.
+
+    :param a: alarm record, as `begin` left it.
+    """
+    a.unknown = True
 
 
 def reset(a: Any) -> Answer:
@@ -278,11 +302,13 @@ def reset(a: Any) -> Answer:
             f'alarm {a.occurrence} is still active; shelve it for the time of '
             'the repair and reset it when its condition has gone',
         )
-    if not a.latched:
+    if not (a.latched or a.unknown):
         return Answer(False, 'there is no alarm to reset')
+    if not a.latched:
+        return acknowledge(a)
     seen = 0 if a.acknowledged else 1 << ACKNOWLEDGED
     a.acknowledged = True
-    a.latched = False
+    a.latched = a.unknown = False
     refresh(a)
     return Answer(True, f'alarm {a.occurrence} reset', seen | 1 << RESET)
 

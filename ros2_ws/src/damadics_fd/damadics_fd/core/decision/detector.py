@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from damadics_fd.core.approximator.step import ESTIMATE, Estimate
 from damadics_fd.core.decision import alarm
+from damadics_fd.core.decision import saved as saved_state
 from damadics_fd.core.decision.events import Event, events_of
 from damadics_fd.core.decision.judge import DECISION, STATE, judge, show
 from damadics_fd.core.settings import Settings
@@ -195,17 +196,23 @@ class Detector:
         :raises ValueError: where it is not such a state; the present one is then untouched.
         """
         state = np.zeros(1, STATE)
-        wrong = sorted(set(saved) ^ set(STATE.names or ()))
+        values = saved_state.complete(saved)
+        wrong = sorted(set(values) ^ set(STATE.names or ()))
         if wrong:
             raise ValueError(f'alarm state: {", ".join(wrong)} missing or unknown')
-        for name, value in saved.items():
+        saved_state.check(values)
+        for name, value in values.items():
             try:
                 state[name][0] = value
             except (TypeError, ValueError, OverflowError) as error:
-                raise ValueError(f'alarm state: {name} = {value!r}: {error}') from error
-        if not all(np.isfinite(state[name]).all() for name in STATE.names or ()):
-            raise ValueError('alarm state: a number is not finite')
+                raise ValueError(f'alarm state: {name} does not fit: {error}') from error
         self.state[:] = state
+        self._show(0)
+
+    def lose(self) -> None:
+        """Begin afresh where the state of before is lost: shown until a person has seen it."""
+        self.reset()
+        alarm.lose(self.state[0])
         self._show(0)
 
     def _outcome(self, answer: alarm.Answer) -> Outcome:

@@ -98,7 +98,8 @@ def _event(transition: int, d: Any) -> Event:
 
 def _text(transition: int, d: Any, duration: float) -> str:
     name = TRANSITIONS[transition].replace('_', ' ')
-    number = '' if transition in (SHELVED, UNSHELVED, NEAR_MISS) else f' {int(d.occurrence)}'
+    unnumbered = transition in (SHELVED, UNSHELVED, NEAR_MISS) or not d.occurrence
+    number = '' if unnumbered else f' {int(d.occurrence)}'
     text = (
         f'{name}{number}: velocity residual {float(d.ratio):.2f} x threshold '
         f'({float(d.residual):.3g} / {float(d.threshold):.3g} 1/s)'
