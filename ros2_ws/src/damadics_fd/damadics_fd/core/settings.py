@@ -217,6 +217,27 @@ class Settings:
         },
     )
 
+    air_to: str = choice(
+        'what the air in the servomotor does to the valve; the spring does the opposite',
+        ('close', 'open'),
+        'close',
+        'close',
+    )
+    flow_to: str = choice(
+        'what the flow does to the plug: it pushes it to open or to close',
+        ('open', 'close'),
+        'open',
+        'open',
+    )
+    ps_lag: float = number(
+        's',
+        'damping of the transmitter of the chamber pressure; the other signals are delayed alike',
+        0.0,
+        10.0,
+        0.0,
+        0.0,
+    )
+
     # the valve signature
     signature: bool = switch('tell friction, spring and sensors apart; needs ps', False, True)
     own_alarm: bool = switch('alarm on changes that the approximator cannot see', False, True)
@@ -389,11 +410,39 @@ class Settings:
             choices = item.metadata.get('choices')
             array[item.name] = choices.index(value) if choices else value
         array['dt'] = 1.0 / self.sample_rate
+        array['preload'] = self.spring_origin
         array['weight'] = self.mass * self.gravity / (self.stiffness * self.stroke)
-        array['area_per_force'] = self.area / (self.stiffness * self.stroke)
-        plug = math.pi * self.plug_diameter**2 / 4.0
-        array['plug_per_force'] = plug / (self.stiffness * self.stroke)
+        array['area_per_force'] = self.signed_area / (self.stiffness * self.stroke)
+        array['plug_per_force'] = self.signed_plug_area / (self.stiffness * self.stroke)
         return array
+
+    @property
+    def spring_origin(self) -> float:
+        """
+        Return where the spring is relaxed, so that its force is K L (X + origin), + to open.
+
+        :return: preload where the spring opens, -(1 + preload) where it closes [1].
+        """
+        return self.preload if self.air_to == 'close' else -1.0 - self.preload
+
+    @property
+    def signed_area(self) -> float:
+        """
+        Return the area of the diaphragm, negative where the air opens.
+
+        :return: [m2].
+        """
+        return self.area if self.air_to == 'close' else -self.area
+
+    @property
+    def signed_plug_area(self) -> float:
+        """
+        Return the area of the plug, negative where the flow closes.
+
+        :return: [m2].
+        """
+        area = math.pi * self.plug_diameter**2 / 4.0
+        return area if self.flow_to == 'open' else -area
 
 
 def _dtype() -> np.dtype:

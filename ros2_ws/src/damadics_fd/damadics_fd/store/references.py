@@ -51,6 +51,9 @@ BINDING = (
     'plug_diameter',
     'gravity',
     'plug_table',
+    'air_to',
+    'flow_to',
+    'ps_lag',
 )
 
 
@@ -199,10 +202,12 @@ def _check(reference: Reference, actuator: str, settings: Settings, now: float) 
             'future: set the clock right'
         )
     present = settings.to_dict()
+    # a setting that is younger than the reference had its default then
+    learned = {**Settings.for_mode(settings.mode).to_dict(), **reference.settings}
     changed = [
-        f'{name} = {present[name]} was {reference.settings.get(name)}'
+        f'{name} = {present[name]} was {learned[name]}'
         for name in BINDING
-        if present[name] != reference.settings.get(name)
+        if present[name] != learned[name]
     ]
     if changed:
         raise ValueError(f'was learned with other settings ({", ".join(changed)}): learn anew')

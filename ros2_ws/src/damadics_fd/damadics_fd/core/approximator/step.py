@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damadics_fd.core import quality
-from damadics_fd.core.approximator import learning, observer, velocity
+from damadics_fd.core.approximator import learning, observer, transmitter, velocity
 from damadics_fd.core.jit import jit, layer
 from damadics_fd.core.modes import MONITOR, PAPER, PHASE_PAPER
 from damadics_fd.core.valve import force
@@ -48,6 +48,7 @@ STATE = np.dtype(
                 *learning.STATE,
                 *velocity.STATE,
                 *observer.STATE,
+                *transmitter.STATE,
             ],
             align=True,
         ),
@@ -160,8 +161,10 @@ def step(
     if reason != quality.ACCEPTED:
         return reason
 
-    y = x1 + c.preload
     afresh = dt < 0.0
+    if c.ps_lag > 0.0:
+        x1, p1, p2 = transmitter.delay(s, c, afresh, abs(dt), x1, p1, p2)
+    y = x1 + c.preload
     if afresh:
         dt = -dt
         velocity.restart(s, y)

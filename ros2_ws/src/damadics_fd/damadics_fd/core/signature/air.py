@@ -32,9 +32,10 @@ def track_air(s: Any, c: Any, learn: bool) -> bool:
     """
     ps0 = s.bp[0] * c.force_scale / c.diaphragm_area
     ps2 = s.bp[2] * c.force_scale / c.diaphragm_area
-    swept = c.diaphragm_area * c.stroke
-    air0 = (P_ATM + ps0) * (c.chamber_volume + swept * s.bx[0])  # [J] m R T
-    air2 = (P_ATM + ps2) * (c.chamber_volume + swept * s.bx[2])
+    swept = c.diaphragm_area * c.stroke  # negative where the air opens: the chamber is full at 0
+    least = c.chamber_volume - min(swept, 0.0)
+    air0 = (P_ATM + ps0) * (least + swept * s.bx[0])  # [J] m R T
+    air2 = (P_ATM + ps2) * (least + swept * s.bx[2])
     rate = (air2 - air0) / (s.bt[2] - s.bt[0])
     ps = 0.5 * (ps0 + ps2)
     way = FILL if rate > 0.0 else VENT

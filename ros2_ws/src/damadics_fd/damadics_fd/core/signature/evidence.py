@@ -267,7 +267,7 @@ def joint_change(s: Any, c: Any, m: int) -> bool:
     v = s.vb[m] / ne
     scale = max(s.theta[SIGN] + s.theta[V] * v, SMALL_FRICTION)
     s.now[0] = d[0] / s.theta[X1]
-    s.now[1] = d[1] * c.force_scale
+    s.now[1] = d[1] * (c.force_scale if c.diaphragm_area > 0.0 else -c.force_scale)
     s.now[2] = (d[2] + d[3] * v) / scale
     s.now_std[0] = math.sqrt(H[0, 0]) / s.theta[X1]
     s.now_std[1] = math.sqrt(H[1, 1]) * c.force_scale

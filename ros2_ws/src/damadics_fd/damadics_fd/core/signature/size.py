@@ -61,7 +61,8 @@ def physical_value(s: Any, c: Any, m: int, h: int) -> tuple[float, float]:
         K = s.unit[X1]
         return in_units(value, std, s.theta[X1] / K, s.unit_cov[X1, X1] / (K * K))
     if h == PRELOAD:
-        return value * c.force_scale, std * c.force_scale
+        force = c.force_scale if c.diaphragm_area > 0.0 else -c.force_scale  # the spring closes
+        return value * force, std * c.force_scale
     if h in (POSITION_GAIN, PRESSURE_GAIN):
         gain = 1.0 / max(1.0 - value, 1e-3)  # the column uses the measured, wrong value
         return value * gain, std * gain * gain

@@ -102,10 +102,10 @@ class SignatureSettings:
 
     # geometry; defaults: DAMADICS actuator
     force_scale: float = 60892.0 * 0.0381  # [N] FN = K L
-    preload: float = 0.25  # [1] X0 / stroke, so that x1 = X + preload
+    preload: float = 0.25  # [1] x1 = X + preload is 0 where the spring is relaxed
     weight: float = 2.0 * 9.81  # [N] m g
-    diaphragm_area: float = 0.029  # [m2] Ae
-    plug_area: float = float(np.pi) * 0.05**2 / 4.0  # [m2]
+    diaphragm_area: float = 0.029  # [m2] Ae, negative where the air opens
+    plug_area: float = float(np.pi) * 0.05**2 / 4.0  # [m2] negative where the flow closes
     plug_x: tuple[float, ...] = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.99, 1.0)
     plug_km: tuple[float, ...] = (
         1.0,
@@ -189,10 +189,10 @@ class SignatureSettings:
         c = settings
         return cls(
             force_scale=c.stiffness * c.stroke,
-            preload=c.preload,
+            preload=c.spring_origin,
             weight=c.mass * c.gravity,
-            diaphragm_area=c.area,
-            plug_area=math.pi * c.plug_diameter**2 / 4.0,
+            diaphragm_area=c.signed_area,
+            plug_area=c.signed_plug_area,
             plug_km=c.plug_table,
             stroke=c.stroke,
             theta_nominal=(1.0, 0.0, c.alpha1 / c.alpha4, cls.theta_nominal[SIGN]),
@@ -223,7 +223,9 @@ class SignatureSettings:
             raise ValueError('plug_x must increase and plug_km must be positive')
         if len(self.ne107) != len(CAUSES):
             raise ValueError(f'ne107 must have {len(CAUSES)} classes, got {len(self.ne107)}')
-        for name in ('force_scale', 'diaphragm_area', 'sample_period', 'block', 'sigma_min'):
+        if self.diaphragm_area == 0.0:
+            raise ValueError('diaphragm_area must not be 0')
+        for name in ('force_scale', 'sample_period', 'block', 'sigma_min'):
             if not getattr(self, name) > 0.0:
                 raise ValueError(f'{name} must be positive, got {getattr(self, name)}')
 

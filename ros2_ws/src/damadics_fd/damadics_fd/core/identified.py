@@ -1,0 +1,31 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""What `commission` has found out about a valve, in every mode."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from numpy.typing import NDArray
+
+OK, LIMITED, REFUSED = 'ok', 'limited', 'refused'
+VERDICTS = (OK, LIMITED, REFUSED)
+Value = bool | float | str | list[float]
+
+
+@dataclass(frozen=True)
+class Identified:
+    """Hold settings of a valve, how far they are to be trusted, and why."""
+
+    verdict: str  # OK, LIMITED or REFUSED
+    settings: Mapping[str, Value]  # by name; those that equal the defaults may be left out
+    report: tuple[str, ...]  # lines for people: what was found, in the order to be printed
+    reasons: tuple[str, ...] = ()  # why it is not OK: what does not fit, what will be missed
+    learned: Mapping[str, object] = field(default_factory=dict)  # for a reference; {}: none
+
+
+@dataclass(frozen=True)
+class FaultFree:
+    """Hold one fault-free recording as `commission` hands it to `identify` of a mode."""
+
+    name: str
+    columns: Mapping[str, NDArray]  # `stamp` [ns] and the signals by name, NaN: not measured
