@@ -83,15 +83,45 @@ class Course:
 
 
 CATALOGUE = {
-    'G20': Valve(stroke=0.02, area=0.012, stiffness=60e3, mass=2.0, dead_volume=1.5e-3,
-                 plug_diameter=0.03, orifice=0.9e-9),
+    'G20': Valve(
+        stroke=0.02,
+        area=0.012,
+        stiffness=60e3,
+        mass=2.0,
+        dead_volume=1.5e-3,
+        plug_diameter=0.03,
+        orifice=0.9e-9,
+    ),
     'G38': Valve(),
-    'G50': Valve(stroke=0.05, area=0.035, stiffness=90e3, mass=6.0, dead_volume=6e-3, dry=0.05,
-                 plug_diameter=0.06, orifice=3.2e-9),
-    'G60': Valve(stroke=0.06, area=0.06, stiffness=110e3, mass=9.0, dead_volume=9e-3,
-                 plug_diameter=0.08, orifice=5e-9),
-    'G100': Valve(stroke=0.1, area=0.09, stiffness=160e3, mass=16.0, dead_volume=18e-3, dry=0.02,
-                  plug_diameter=0.1, orifice=1.2e-8),
+    'G50': Valve(
+        stroke=0.05,
+        area=0.035,
+        stiffness=90e3,
+        mass=6.0,
+        dead_volume=6e-3,
+        dry=0.05,
+        plug_diameter=0.06,
+        orifice=3.2e-9,
+    ),
+    'G60': Valve(
+        stroke=0.06,
+        area=0.06,
+        stiffness=110e3,
+        mass=9.0,
+        dead_volume=9e-3,
+        plug_diameter=0.08,
+        orifice=5e-9,
+    ),
+    'G100': Valve(
+        stroke=0.1,
+        area=0.09,
+        stiffness=160e3,
+        mass=16.0,
+        dead_volume=18e-3,
+        dry=0.02,
+        plug_diameter=0.1,
+        orifice=1.2e-8,
+    ),
 }
 
 
@@ -131,7 +161,9 @@ def control(seconds, seed, centre=0.5, amplitude=0.01, period=0.005):
     walk = np.zeros(m)
     for i in range(1, m):
         walk[i] = 0.9 * walk[i - 1] + rng.standard_normal() * amplitude
-    return np.repeat(np.clip(centre + walk, 0.02, 0.98), round(1 / period))[: round(seconds / period)]
+    return np.repeat(np.clip(centre + walk, 0.02, 0.98), round(1 / period))[
+        : round(seconds / period)
+    ]
 
 
 def batch(seconds, seed, rest=300.0, period=0.005):
@@ -160,8 +192,27 @@ def _mass_flow(c, up, down):
 
 @numba.njit(cache=True)
 def _advance(cv, P, T, km, kind, dt, sub, out, p1, p2, supply, state):
-    (L, A, K, x0, m, V0, fc, asym, fsr, vs, c, age, hyst, air, flow, plug, orifice,
-     play, installed) = P
+    (
+        L,
+        A,
+        K,
+        x0,
+        m,
+        V0,
+        fc,
+        asym,
+        fsr,
+        vs,
+        c,
+        age,
+        hyst,
+        air,
+        flow,
+        plug,
+        orifice,
+        play,
+        installed,
+    ) = P
     (t_fault, d_dry, d_visc, d_spring, ramp, f_day, k_day, run_in, day) = T
     x, v, p, integ, op, clock, z, seat, rest = state
     weight = m * 9.81
@@ -234,7 +285,7 @@ def _advance(cv, P, T, km, kind, dt, sub, out, p1, p2, supply, state):
                     rest = 0.0
             else:
                 Fd = fc * friction * side * (1 + (fsr - 1) * np.exp(-((v / vs) ** 2)))
-                new = (v + dt / m * (f - (Fd if v > 0 else -Fd)))
+                new = v + dt / m * (f - (Fd if v > 0 else -Fd))
                 new /= 1 + dt / m * c * (1 + d_visc * grown)
                 if new * v < 0:
                     new = 0.0
@@ -283,12 +334,38 @@ def simulate(valve, cv, course=None, seed=0, rate=200.0, dt=5e-4):
     if c.supply_steps:
         supply *= 1 - c.supply_steps * (np.floor(t / 300.0) % 2)
     air, flow = (1.0 if v.air_to == 'close' else -1.0), (1.0 if v.flow_to == 'open' else -1.0)
-    P = (v.stroke, v.area, v.stiffness, v.preload, v.mass, v.dead_volume, v.dry * v.force,
-         v.asymmetry, v.static, v.stribeck, v.viscous * v.force / v.stroke, v.ageing,
-         v.hysteresis * v.force, air, flow, np.pi * v.plug_diameter**2 / 4, v.orifice, v.play,
-         v.installed)
-    T = (c.fault_at, c.dry, c.viscous, c.spring, c.ramp, c.friction_day, c.spring_day,
-         c.run_in, c.day)
+    P = (
+        v.stroke,
+        v.area,
+        v.stiffness,
+        v.preload,
+        v.mass,
+        v.dead_volume,
+        v.dry * v.force,
+        v.asymmetry,
+        v.static,
+        v.stribeck,
+        v.viscous * v.force / v.stroke,
+        v.ageing,
+        v.hysteresis * v.force,
+        air,
+        flow,
+        np.pi * v.plug_diameter**2 / 4,
+        v.orifice,
+        v.play,
+        v.installed,
+    )
+    T = (
+        c.fault_at,
+        c.dry,
+        c.viscous,
+        c.spring,
+        c.ramp,
+        c.friction_day,
+        c.spring_day,
+        c.run_in,
+        c.day,
+    )
     start = 0.0 if air > 0 else v.stroke
     state = (start, 0.0, ATM, 0.0, 0.0, 0.0, 0.0, start / v.stroke, 0.0)
     out = np.empty((n, 5))
