@@ -9,6 +9,7 @@ from pathlib import Path
 
 from damadics_evaluate.baselines import DETECTORS, MissingPackageError
 from damadics_evaluate.campaign import Campaign
+from damadics_evaluate.lublin import command as lublin
 from damadics_evaluate.runner import read_results, run_campaign
 from damadics_evaluate.tables import compare, write_csv
 from damadics_evaluate.trajectories import CACHE_VARIABLE, SCENARIOS
@@ -93,6 +94,7 @@ def _parser() -> argparse.ArgumentParser:
     versus.add_argument('a', type=Path)
     versus.add_argument('b', type=Path)
     versus.add_argument('--csv', type=Path, help='write all rows here')
+    lublin.add_parser(commands)
     return parser
 
 
@@ -105,7 +107,13 @@ def main(argv: list[str] | None = None) -> int:
     """
     arguments = _parser().parse_args(argv)
     try:
-        commands = {'run': _run, 'report': _report, 'compare': _compare, 'paper': _paper}
+        commands = {
+            'run': _run,
+            'report': _report,
+            'compare': _compare,
+            'paper': _paper,
+            'lublin': lublin.lublin,
+        }
         commands[arguments.command](arguments)
     except (ValueError, OSError, MissingPackageError, ImportError) as error:
         print(f'evaluate: {error}', file=sys.stderr)

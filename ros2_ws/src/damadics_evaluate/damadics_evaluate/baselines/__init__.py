@@ -36,4 +36,16 @@ DETECTORS: dict[str, type[Detector]] = {
     )
 }
 
-__all__ = ['DETECTORS', 'Detector', 'MissingPackageError']
+
+def find_detector(name: str) -> type[Detector]:
+    """
+    Return a detector by name.
+
+    :raises ValueError: where there is none.
+    """
+    if name not in DETECTORS:
+        raise ValueError(f'no detector {name}: detectors are {", ".join(DETECTORS)}')
+    return DETECTORS[name]
+
+
+__all__ = ['DETECTORS', 'Detector', 'MissingPackageError', 'find_detector']

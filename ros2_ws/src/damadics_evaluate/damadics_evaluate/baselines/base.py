@@ -52,6 +52,7 @@ class Detector(ABC):
     calibrated: ClassVar[bool] = True  # the limit comes from nominal days, else it is 1
     t_on: float = T_ON
     learn_from: float = 60.0
+    plant_limit: float | None = None  # the textbook's limit, for records too short to set one
 
     @abstractmethod
     def fit(self, hour: Floats) -> None:
@@ -60,6 +61,20 @@ class Detector(ABC):
     @abstractmethod
     def statistic(self, samples: Floats) -> Floats:
         """Return the statistic, one per row; anything below the limit while it starts up."""
+
+    def prepare_for_plant(self) -> None:
+        """Get ready for a record of a running plant: no start-up, alarms that end."""
+        self.t_on = self.learn_from = 0.0
+
+    def cause(self, samples: Floats, alarm: float) -> str:
+        """
+        Name the fault behind an alarm.
+
+        :param samples: rows up to the time at which it is to be named.
+        :param alarm: when the alarm was raised, s.
+        :return: such as 'f16' or 'f16 or f17'; empty where the detector names none.
+        """
+        return ''
 
     def settings(self) -> dict[str, Any]:
         """Return the plain numbers that shape the detector, for the settings hash."""

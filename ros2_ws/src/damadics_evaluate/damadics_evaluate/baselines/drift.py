@@ -42,6 +42,7 @@ class Adwin(FirResidual):
     """
 
     name, title = 'adwin', 'ADWIN (river)'
+    plant_limit = 4.0  # the weakest step of the ladder
 
     def __init__(self, decades: tuple[int, ...] = (4, 8, 16, 32, 64, 128, 192, 256, 300)) -> None:
         self.decades = decades

@@ -24,13 +24,13 @@ def _ewma(z: np.ndarray, weight: float) -> np.ndarray:
 
 
 @jit
-def _cusum(z: np.ndarray, k: float) -> np.ndarray:
+def _cusum(z: np.ndarray, k: float, ceiling: float) -> np.ndarray:
     out = np.zeros_like(z)
     up = 0.0
     down = 0.0
     for i in range(z.size):
-        up = max(0.0, up + z[i] - k)
-        down = max(0.0, down - z[i] - k)
+        up = min(max(0.0, up + z[i] - k), ceiling)
+        down = min(max(0.0, down - z[i] - k), ceiling)
         out[i] = max(up, down)
     return out
 
@@ -118,24 +118,38 @@ class CusumOnDeviation(Deviation):
     """Two-sided CUSUM of the deviation."""
 
     name, title = 'cusum', 'CUSUM(0.5) of CV-X'
+    plant_limit = 12.0
+    ceiling = math.inf  # of the sums, so that an alarm ends soon after its fault
 
     def __init__(self, k: float = 0.5) -> None:
         self.k = k
 
+    def prepare_for_plant(self) -> None:
+        """Bound the sums at twice the limit."""
+        super().prepare_for_plant()
+        self.ceiling = 2.0 * self.plant_limit
+
     def _test(self, z: Floats) -> Floats:
-        return np.asarray(_cusum(z, self.k))
+        return np.asarray(_cusum(z, self.k, self.ceiling))
 
 
 class FirCusum(FirResidual):
     """Two-sided CUSUM of the FIR residual."""
 
     name, title = 'fir_cusum', 'FIR(4) + CUSUM(1)'
+    plant_limit = 12.0
+    ceiling = math.inf
 
     def __init__(self, k: float = 1.0) -> None:
         self.k = k
 
+    def prepare_for_plant(self) -> None:
+        """Bound the sums at twice the limit."""
+        super().prepare_for_plant()
+        self.ceiling = 2.0 * self.plant_limit
+
     def _test(self, z: Floats) -> Floats:
-        return np.asarray(_cusum(z, self.k))
+        return np.asarray(_cusum(z, self.k, self.ceiling))
 
 
 class Glr(FirResidual):
