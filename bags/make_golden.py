@@ -20,7 +20,7 @@ from damadics_fd.bag import BagWriter, read_columns
 from damadics_fd.bag.rosbag2 import qos
 from damadics_fd.core.pipeline import run
 from damadics_fd.core.settings import Settings
-from damadics_plant.library import load_scenario
+from damadics_plant.scenarios.library import load_scenario
 from damadics_plant.simulator import Simulator
 
 HERE = Path(__file__).parent

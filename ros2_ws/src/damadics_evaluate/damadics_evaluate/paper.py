@@ -165,7 +165,7 @@ def _states(noisy: Mapping[str, Any], quiet: list[Any]) -> list[Row]:
 def _scada() -> dict[str, Alarms]:
     """Learn from a fault-free record with the paper's CV profile, then run the experiments."""
     from damadics_plant import Scenario, load_scenario, simulate
-    from damadics_plant.sources import Steps
+    from damadics_plant.scenarios.sources import Steps
 
     base: Scenario = load_scenario(RUNS[0])
     times, values = base.cv.times, base.cv.values

@@ -9,12 +9,12 @@ The DAMADICS actuator: control valve, servomotor and positioner with the benchma
 (np.float64(120.0), np.int64(4))
 """
 
-from damadics_plant.faults import CATALOGUE, Fault
-from damadics_plant.library import load_scenario, scenario_names
-from damadics_plant.parameters import Actuator, LuGreActuator
+from damadics_plant.actuator.parameters import Actuator, LuGreActuator
+from damadics_plant.faults.catalogue import CATALOGUE, Fault
 from damadics_plant.run import Run
-from damadics_plant.scenario import Scenario
-from damadics_plant.scenario_file import ScenarioError, read_scenarios
+from damadics_plant.scenarios.file import ScenarioError, read_scenarios
+from damadics_plant.scenarios.library import load_scenario, scenario_names
+from damadics_plant.scenarios.scenario import Scenario
 from damadics_plant.simulator import Simulator, simulate
 
 __all__ = [

@@ -16,11 +16,11 @@ from typing import Any
 
 from damadics_fd.bag.errors import BagError
 
-from damadics_plant.campaign import ALL, Job, run_all, run_one
-from damadics_plant.faults import CATALOGUE, Fault
-from damadics_plant.library import load_scenario, scenario_names
-from damadics_plant.recorded import read_recorded
-from damadics_plant.scenario import Scenario
+from damadics_plant.export import ALL, Job, run_all, run_one
+from damadics_plant.faults.catalogue import CATALOGUE, Fault
+from damadics_plant.scenarios.library import load_scenario, scenario_names
+from damadics_plant.scenarios.recorded import read_recorded
+from damadics_plant.scenarios.scenario import Scenario
 from damadics_plant.simulator import MODELS
 
 _EXAMPLE = """\

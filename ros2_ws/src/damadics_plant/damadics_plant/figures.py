@@ -10,12 +10,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from damadics_plant.faults import CATALOGUE, Fault
-from damadics_plant.library import load_scenario
+from damadics_plant.faults.catalogue import CATALOGUE, Fault
 from damadics_plant.run import Run
-from damadics_plant.scenario import Scenario
+from damadics_plant.scenarios.library import load_scenario
+from damadics_plant.scenarios.scenario import Scenario
+from damadics_plant.scenarios.sources import Steps
 from damadics_plant.simulator import simulate
-from damadics_plant.sources import Steps
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from damadics_plant.measure import OUTPUTS
-from damadics_plant.scenario import Scenario
+from damadics_plant.actuator.measure import OUTPUTS
+from damadics_plant.scenarios.scenario import Scenario
 
 COLUMNS = ('stamp', 'cv', *OUTPUTS)
 """Columns of a run."""

@@ -10,16 +10,17 @@ from typing import Any
 
 import numpy as np
 
-from damadics_plant import dablib, lugre
-from damadics_plant.disturbance import Disturbance
-from damadics_plant.faults import CATALOGUE, EFFECTS_DTYPE, Fault, fault_table
-from damadics_plant.level import LevelLoop
-from damadics_plant.library import load_scenario
-from damadics_plant.measure import OUTPUTS, ROWS
-from damadics_plant.parameters import Actuator, LuGreActuator
+from damadics_plant.actuator import dablib, lugre
+from damadics_plant.actuator.measure import OUTPUTS, ROWS
+from damadics_plant.actuator.parameters import Actuator, LuGreActuator
+from damadics_plant.faults.catalogue import CATALOGUE, Fault
+from damadics_plant.faults.effects import EFFECTS_DTYPE, fault_table
 from damadics_plant.run import Columns, Run, stamps
-from damadics_plant.scenario import Scenario
-from damadics_plant.sources import RandomSteps, Source
+from damadics_plant.scenarios.disturbance import Disturbance
+from damadics_plant.scenarios.level import LevelLoop
+from damadics_plant.scenarios.library import load_scenario
+from damadics_plant.scenarios.scenario import Scenario
+from damadics_plant.scenarios.sources import RandomSteps, Source
 
 MODELS: dict[str, tuple[type[Actuator], ModuleType]] = {
     'dablib': (Actuator, dablib),

@@ -15,9 +15,9 @@ import pytest
 from damadics_fd.bag.cdr.definition import schema_text
 from damadics_fd.bag.columns import read_columns
 from damadics_fd.bag.errors import BagError
-from damadics_plant import CATALOGUE, campaign, figures, scenario_names, simulate
+from damadics_plant import CATALOGUE, export, figures, scenario_names, simulate
+from damadics_plant.actuator.parameters import LuGreActuator
 from damadics_plant.command import main
-from damadics_plant.parameters import LuGreActuator
 
 HEADER = 't,cv,x1,p1,p2,t1,flow,ps,fault,strength'
 
@@ -150,7 +150,7 @@ def test_error_is_one_line(arguments, message, capsys, tmp_path, monkeypatch):
 
 def test_full_disk_is_foreseen(tmp_path, monkeypatch, capsys):
     usage = type('Usage', (), {'free': 10**6})
-    monkeypatch.setattr(campaign.shutil, 'disk_usage', lambda path: usage)
+    monkeypatch.setattr(export.shutil, 'disk_usage', lambda path: usage)
     assert main(['f5_I', '--out', str(tmp_path / 'a.csv')]) == 1
     assert 'lower --rate' in capsys.readouterr().err
 

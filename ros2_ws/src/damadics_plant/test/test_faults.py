@@ -5,7 +5,7 @@
 import numpy as np
 import pytest
 from damadics_plant import CATALOGUE, Fault, Scenario, simulate
-from damadics_plant.sources import Constant, Steps
+from damadics_plant.scenarios.sources import Constant, Steps
 
 STILL = 60  # s, long enough for the valve to come to rest
 

@@ -5,7 +5,7 @@
 import numpy as np
 import pytest
 from damadics_plant import Fault, LuGreActuator, Scenario, Simulator, simulate
-from damadics_plant.sources import Steps
+from damadics_plant.scenarios.sources import Steps
 from scipy.integrate import solve_ivp
 
 BEGIN, HOLD = 10.01, 0.035  # s; BEGIN is a tick of the positioner and a sample at 200 Hz

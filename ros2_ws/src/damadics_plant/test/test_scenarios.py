@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from damadics_plant import ScenarioError, load_scenario, read_scenarios, scenario_names, simulate
-from damadics_plant.recorded import read_recorded
-from damadics_plant.scenario import Scenario
+from damadics_plant.scenarios.recorded import read_recorded
+from damadics_plant.scenarios.scenario import Scenario
 
 DATA = Path(__file__).parents[5] / 'shared' / 'data'
 MODES = {  # tables 28 and 29 of DABLib's manual

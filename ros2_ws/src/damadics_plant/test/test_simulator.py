@@ -10,10 +10,10 @@ import sys
 import numpy as np
 import pytest
 from damadics_plant import CATALOGUE, Fault, Scenario, Simulator, simulate
+from damadics_plant.actuator.parameters import RANGES
 from damadics_plant.batch import simulate_many
-from damadics_plant.level import LevelLoop
-from damadics_plant.parameters import RANGES
-from damadics_plant.sources import Constant, RandomSteps, Steps
+from damadics_plant.scenarios.level import LevelLoop
+from damadics_plant.scenarios.sources import Constant, RandomSteps, Steps
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

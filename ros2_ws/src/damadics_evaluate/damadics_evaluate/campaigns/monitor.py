@@ -25,7 +25,7 @@ from damadics_fd.core.modes import PHASE_MONITOR
 from damadics_fd.core.pipeline import Result, run
 from damadics_fd.core.settings import Settings
 from damadics_plant import Fault, LuGreActuator, Scenario, Simulator, simulate
-from damadics_plant.sources import RandomSteps, Sine
+from damadics_plant.scenarios.sources import RandomSteps, Sine
 
 RATE = 200.0
 FRICTION, SPRING = 'f4', 'f11'

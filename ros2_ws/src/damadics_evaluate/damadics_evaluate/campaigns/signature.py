@@ -28,9 +28,9 @@ from damadics_fd.core.pipeline import Result, run
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.signature.state import CAUSES
 from damadics_plant import Actuator, Fault, LuGreActuator, Scenario, simulate
-from damadics_plant.disturbance import CHAMBER_NOISE, HUM, WHITE
-from damadics_plant.parameters import RANGES
-from damadics_plant.sources import RandomSteps, Sine, Steps
+from damadics_plant.actuator.parameters import RANGES
+from damadics_plant.scenarios.disturbance import CHAMBER_NOISE, HUM, WHITE
+from damadics_plant.scenarios.sources import RandomSteps, Sine, Steps
 from tqdm import tqdm
 
 RATE = 200.0

@@ -73,7 +73,7 @@ def test_a_shelved_alarm_is_a_function_check_whatever_its_cause():
 def slow_wear() -> Result:
     """Let friction fall by 60 % an hour under a threshold that the approximator never meets."""
     from damadics_plant import Fault, LuGreActuator, Scenario, simulate
-    from damadics_plant.sources import RandomSteps, Sine
+    from damadics_plant.scenarios.sources import RandomSteps, Sine
 
     scenario = Scenario(
         'wear',

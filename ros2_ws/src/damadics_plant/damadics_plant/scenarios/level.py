@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from damadics_plant.sources import Constant, Sine, Source
+from damadics_plant.scenarios.sources import Constant, Sine, Source
 
 
 @dataclass

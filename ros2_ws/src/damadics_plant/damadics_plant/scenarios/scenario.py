@@ -4,8 +4,8 @@
 
 from dataclasses import dataclass, field
 
-from damadics_plant.faults import Fault
-from damadics_plant.sources import Constant, Source
+from damadics_plant.faults.catalogue import Fault
+from damadics_plant.scenarios.sources import Constant, Source
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@
 import numpy as np
 from damadics_fd.core.jit import jit
 
-from damadics_plant.physics import Record
-from damadics_plant.valve import compressibility, valve_flow, water_density
+from damadics_plant.actuator.physics import Record
+from damadics_plant.actuator.valve import compressibility, valve_flow, water_density
 
 OUTPUTS = ('x1', 'p1', 'p2', 't1', 'flow', 'ps', 'fault', 'strength')
 """Rows of the output of a model, in SI; the last row after them is the true flow [kg/s]."""

@@ -14,10 +14,9 @@ from typing import Any
 import numpy as np
 from damadics_fd.core.jit import jit
 
-from damadics_plant.faults import update_effects
-from damadics_plant.measure import measure
-from damadics_plant.parameters import ATMOSPHERE, Actuator
-from damadics_plant.physics import (
+from damadics_plant.actuator.measure import measure
+from damadics_plant.actuator.parameters import ATMOSPHERE, Actuator
+from damadics_plant.actuator.physics import (
     Record,
     air_flow,
     feedback_angle,
@@ -25,7 +24,8 @@ from damadics_plant.physics import (
     set_point_filter,
     transducer,
 )
-from damadics_plant.valve import vapour_pressure
+from damadics_plant.actuator.valve import vapour_pressure
+from damadics_plant.faults.effects import update_effects
 
 RATE = 400.0
 """Steps per second."""

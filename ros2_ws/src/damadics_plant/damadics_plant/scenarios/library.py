@@ -7,11 +7,11 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
-from damadics_plant.faults import CATALOGUE, Fault
-from damadics_plant.scenario import Scenario
-from damadics_plant.scenario_file import ScenarioError, read_scenarios
+from damadics_plant.faults.catalogue import CATALOGUE, Fault
+from damadics_plant.scenarios.file import ScenarioError, read_scenarios
+from damadics_plant.scenarios.scenario import Scenario
 
-_FOLDER = Path(__file__).with_name('scenarios')
+_FOLDER = Path(__file__).parent
 
 
 def scenario_names() -> list[str]:

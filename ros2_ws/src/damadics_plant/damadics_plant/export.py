@@ -16,7 +16,7 @@ from typing import Any, Protocol
 import numpy as np
 from tqdm import tqdm
 
-from damadics_plant.scenario import Scenario
+from damadics_plant.scenarios.scenario import Scenario
 from damadics_plant.simulator import Simulator
 from damadics_plant.writer import BYTES_PER_SAMPLE, open_writer
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from damadics_fd.core.jit import jit
 
-from damadics_plant.physics import KM, KM_POSITION, Record, table
+from damadics_plant.actuator.physics import KM, KM_POSITION, Record, table
 
 CRITICAL_PRESSURE = (
     np.array([0, 1.723763, 3.447527, 6.895055, 13.790111, 17.237639, 20.685166]) * 1e6

@@ -9,11 +9,11 @@ from typing import Any
 
 import yaml
 
-from damadics_plant.faults import CATALOGUE, Fault
-from damadics_plant.level import LevelLoop
-from damadics_plant.recorded import read_recorded
-from damadics_plant.scenario import Scenario
-from damadics_plant.sources import Constant, RandomSteps, Sine, Source, Steps
+from damadics_plant.faults.catalogue import CATALOGUE, Fault
+from damadics_plant.scenarios.level import LevelLoop
+from damadics_plant.scenarios.recorded import read_recorded
+from damadics_plant.scenarios.scenario import Scenario
+from damadics_plant.scenarios.sources import Constant, RandomSteps, Sine, Source, Steps
 
 _SIGNALS = ('cv', 'p1', 'p2', 't1')
 _KEYS = ('description', 'duration', *_SIGNALS, 'faults')

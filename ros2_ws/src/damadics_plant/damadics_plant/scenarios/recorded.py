@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from damadics_plant.sources import Recorded
+from damadics_plant.scenarios.sources import Recorded
 
 _TIME = {'t': 1.0, 't_s': 1.0, 'time': 1.0, 'time_s': 1.0, 'stamp': 1e-9}
 """Names of a time column and their unit in s."""

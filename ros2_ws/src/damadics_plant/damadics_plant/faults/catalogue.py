@@ -1,19 +1,11 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The catalogue of the benchmark's faults f1..f19, their time course and what they act on."""
+"""The catalogue of the benchmark's faults f1..f19."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
-import numpy as np
-from damadics_fd.core.jit import jit
-
-from damadics_plant.physics import Record
-
-FRICTION_GAIN = 20.0
-"""Delta F_1 of the LuGre plant at f4 = 1: packing friction of about 20 % of the spring force."""
+from damadics_plant.faults.time_course import strength_at
 
 
 @dataclass(frozen=True)
@@ -257,152 +249,6 @@ class Fault:
         :param t: time [s].
         :return: f(t), signed.
         """
-        return float(strength_at(fault_table([self])[0], t))
-
-
-FAULT_DTYPE = np.dtype(
-    (
-        np.record,
-        [
-            ('number', 'i8'),
-            ('strength', 'f8'),
-            ('start', 'f8'),
-            ('end', 'f8'),
-            ('development', 'f8'),
-            ('now', 'f8'),  # signed strength that the effects are made from
-        ],
-    )
-)
-
-
-def fault_table(faults: Sequence[Fault]) -> 'np.ndarray[Any, np.dtype[Any]]':
-    """
-    Lay faults out for compiled code.
-
-    :param faults: any number of faults.
-    :return: structured array of shape (len(faults),).
-    """
-    rows = np.zeros(len(faults), FAULT_DTYPE)
-    for i, fault in enumerate(faults):
-        rows[i] = (
-            fault.number,
-            fault.strength * fault.direction,
-            fault.start,
-            fault.end,
-            fault.development,
-            math.nan,
+        return float(
+            strength_at(self.strength * self.direction, self.start, self.end, self.development, t)
         )
-    return rows
-
-
-@jit
-def strength_at(fault: Record, t: float) -> float:
-    """
-    Evaluate the time course of a fault.
-
-    :param fault: one row of `fault_table`.
-    :param t: time [s].
-    :return: signed strength, 0 outside [start, end).
-    """
-    if t < fault.start or t >= fault.end:
-        return 0.0
-    if t - fault.start >= fault.development:
-        return fault.strength
-    return fault.strength * (t - fault.start) / fault.development
-
-
-EFFECTS_DTYPE = np.dtype(
-    (
-        np.record,
-        [
-            (name, 'f8')
-            for name in (
-                'stop',
-                'xr_offset',
-                'kv_factor',
-                'kv_offset',
-                'flow_factor',
-                'play',
-                'twist',
-                'leak',
-                'area',
-                'spring',
-                'friction',
-                'opening',
-                'position',
-                'ps_sensor',
-                'feedback',
-                'supply',
-                'p1',
-                'p2',
-                'bypass',
-                'flow_sensor',
-                'heat',
-                'number',
-                'strength',
-            )
-        ],
-    )
-)
-"""What the faults change, in the units of the model; filled by `update_effects`."""
-
-
-@jit
-def update_effects(faults: Any, t: float, f: Any, a: Record, e: Record, lugre: bool) -> None:
-    """
-    Evaluate all faults at a time and translate them into what the model uses (table 2.1).
-
-    :param faults: rows of `fault_table`; `now` is updated.
-    :param t: time [s].
-    :param f: work space of shape (20,), receives the strengths f[1]..f[19].
-    :param a: constants of the actuator.
-    :param e: effects, overwritten where a strength has changed or they are all 0.
-    :param lugre: whether friction and spring act as in the paper's equations (8), (9).
-    """
-    changed = e.area == 0.0 and e.flow_factor == 0.0
-    for i in range(len(faults)):
-        s = strength_at(faults[i], t)
-        if s != faults[i].now:
-            faults[i].now = s
-            changed = True
-    if not changed:
-        return
-    f[:] = 0.0
-    e.number = 0.0
-    e.strength = 0.0
-    for i in range(len(faults)):
-        s = faults[i].now
-        if s != 0.0:
-            f[faults[i].number] += s
-            if e.number == 0.0:
-                e.number = faults[i].number
-                e.strength = s
-    for i in range(len(f)):
-        f[i] = min(max(f[i], -1.0), 1.0)
-    e.stop = a.stroke * (1 - f[1]) * (1 - 0.2 * f[2]) * (1 + 0.1 * f[3])
-    e.xr_offset = 0.2 * f[2] - 0.1 * f[3]
-    e.kv_factor = (1 - 0.2 * f[2]) * (1 + 0.1 * f[3])
-    e.kv_offset = 0.1 * f[6]
-    e.flow_factor = 1 - 0.05 * f[5]
-    e.play = min(max(a.stroke * (a.play + f[4]), 0.0), a.stroke)
-    e.twist = 0.5 * f[8]
-    e.leak = a.leak_flow * (f[9] + f[10])
-    e.area = a.area * (1 - f[10])
-    if lugre:
-        e.spring = 1 + f[11]
-        e.friction = 1 + (FRICTION_GAIN * f[4] if f[4] > 0 else f[4])
-    else:
-        e.spring = 1 - f[11]
-        e.friction = 1.0
-    e.opening = 1 - f[12]
-    e.position = 1 + 1.25 * f[13]
-    e.ps_sensor = 1 - f[14]
-    e.feedback = f[15] * a.stroke
-    e.supply = a.supply * (1 - f[16])
-    if e.supply < a.supply_minimum:
-        e.supply = 0.0
-    e.p2 = 1 - max(f[17], 0.0)
-    e.p1 = 1 + min(f[17], 0.0)
-    e.bypass = f[18]
-    e.flow_sensor = 1 - f[19]
-    e.heat = 200 + 100 * f[7] if f[7] > 0 else 0.0

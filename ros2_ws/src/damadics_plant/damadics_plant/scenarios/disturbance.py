@@ -4,7 +4,7 @@
 
 import numpy as np
 
-from damadics_plant.parameters import RANGES
+from damadics_plant.actuator.parameters import RANGES
 
 SIGNALS = ('cv', 'x1', 'p1', 'p2', 't1', 'flow', 'ps')
 """Disturbed signals, each with a random stream of its own."""
