@@ -9,7 +9,7 @@ BUILT := ros2_ws/install/.built
 SOURCES := $(shell find ros2_ws/src -type f -not -name '*.pyc' -not -path '*/__pycache__/*' \
 	-not -path '*/test/*' -not -path '*/.pytest_cache/*')
 
-.PHONY: help demo dashboard test report campaign-monitor build env lint clean
+.PHONY: help demo dashboard test report campaign-monitor build env lint types docs clean
 
 help: ## show what can be made
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 18
@@ -41,7 +41,15 @@ $(BUILT): $(SOURCES) tools/build.sh tools/setup_env.py $(wildcard tools/requirem
 	@tools/build.sh
 
 lint: $(BUILT) ## check style and types
-	@$(ENV) && ruff check . && ruff format --check . && mypy ros2_ws/src/damadics_fd/damadics_fd/core
+	@$(ENV) && ruff check . && ruff format --check .
+	@$(MAKE) --no-print-directory types
+
+types: $(BUILT)
+	@$(ENV) && mypy ros2_ws/src/damadics_fd/damadics_fd/core
+
+docs: $(BUILT) ## the documentation with the API pages: docs/_build/index.html
+	@$(ENV) && python -m uv pip install --quiet -r tools/requirements/docs.txt \
+		&& sphinx-build -q -W --keep-going docs docs/_build && echo docs/_build/index.html
 
 clean: ## remove everything that was built
-	rm -rf .venv ros2_ws/build ros2_ws/install ros2_ws/log
+	rm -rf .venv docs/_build ros2_ws/build ros2_ws/install ros2_ws/log
