@@ -3,30 +3,26 @@
 """
 The reference file: what was learned from a fault-free valve, kept over restarts.
 
-JSON in two slots, `NAME.a.json` and `NAME.b.json`. Each save replaces the older slot at once, so
-that a power cut leaves the other; each carries a hash of its content and is refused with the
-reason where it is damaged, of another actuator or of other settings. Nothing is ever unpickled.
+In two slots, see `slots`. It is refused with the reason where it is damaged, of another actuator
+or of other settings.
 """
 
-import hashlib
-import json
 import math
-import os
 import time
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
 
+from damadics_fd.core.record import Saved
 from damadics_fd.core.settings import Settings
+from damadics_fd.store.slots import NAMES, number_of, read_slots, slot_file, write_slot
 
 try:
     VERSION = version('damadics_fd')
 except PackageNotFoundError:  # run from a source tree that was never built
     VERSION = 'unknown'
 FORMAT = 'damadics_fd reference 1'
-SLOTS = ('a', 'b')
+LATEST = 2**31 * 10**9  # ns; what fits into the stamp of a message
 CLOCK_TOLERANCE = 86400.0  # s; a file from later than that is from a wrong clock
 # settings that the learned numbers depend on; the others may change after learning
 BINDING = (
@@ -70,9 +66,9 @@ class Reference:
     """Hold what was learned, and where it comes from."""
 
     actuator: str  # tag, for instance "LC74_20"
-    learned: dict[str, Any]  # Estimator.learned()
-    settings: dict[str, Any]  # Settings.to_dict()
-    signature: dict[str, Any] = field(default_factory=dict)  # Signature.save()
+    learned: Saved  # Estimator.learned()
+    settings: Saved  # Settings.to_dict()
+    signature: Saved = field(default_factory=dict)  # Signature.save()
     source: str = ''  # bag or "live"
     first_stamp: int = 0  # ns, of the learning data
     last_stamp: int = 0
@@ -91,25 +87,8 @@ def save_reference(path: Path | str, reference: Reference, now: float | None = N
     :return: the file written.
     :raises OSError: where the folder cannot be written.
     """
-    content = {**asdict(reference), 'created': time.time() if now is None else now}
-    numbers = {slot: _number(path, slot) for slot in SLOTS}
-    slot = min(SLOTS, key=lambda name: numbers[name])
-    document = {'format': FORMAT, 'number': max(numbers.values()) + 1, 'content': content}
-    document['sha256'] = _digest(document)
-    target = _file(path, slot)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    draft = target.with_suffix('.tmp')
-    with draft.open('w', encoding='utf-8') as stream:
-        json.dump(document, stream, indent=1, allow_nan=False)
-        stream.flush()
-        os.fsync(stream.fileno())
-    draft.replace(target)
-    folder = os.open(target.parent, os.O_RDONLY)
-    try:
-        os.fsync(folder)
-    finally:
-        os.close(folder)
-    return target
+    created = time.time() if now is None else now
+    return write_slot(path, FORMAT, {**asdict(reference), 'created': created})
 
 
 def load_reference(
@@ -126,71 +105,57 @@ def load_reference(
     :raises NoReferenceError: where there is none.
     :raises ReferenceFileError: where neither slot is good, with the reason of each.
     """
-    if not any(_file(path, slot).exists() for slot in SLOTS):
+    slots = read_slots(path, FORMAT)
+    if not slots:
         raise NoReferenceError(f'none is kept yet in {path}')
     now = time.time() if now is None else now
-    found: list[tuple[int, Reference]] = []
-    reasons = []
-    for slot in SLOTS:
-        file = _file(path, slot)
+    reasons = {slot_file(path, name): ' does not exist' for name in NAMES}
+    for slot in slots:
         try:
-            document = _read(file)
-            reference = _reference(document['content'])
+            if slot.content is None:
+                raise ValueError(slot.problem)
+            reference = _reference(slot.content)
             _check(reference, actuator, settings, now)
-            found.append((document['number'], reference))
-        except FileNotFoundError:
-            reasons.append(f'{file} does not exist')
-        except (OSError, ValueError) as error:
-            reasons.append(f'{file}: {error}')
-    if not found:
-        raise ReferenceFileError('; '.join(reasons))
-    return max(found, key=lambda pair: pair[0])[1]
+            return reference
+        except ValueError as error:
+            reasons[slot.file] = f': {error}'
+    raise ReferenceFileError('; '.join(f'{file}{text}' for file, text in reasons.items()))
 
 
-def _file(path: Path | str, slot: str) -> Path:
-    return Path(f'{path}.{slot}.json')
-
-
-def _number(path: Path | str, slot: str) -> int:
+def _reference(content: Saved) -> Reference:
     try:
-        return int(_read(_file(path, slot))['number'])
-    except (OSError, ValueError):
-        return -1  # nothing there worth keeping
-
-
-def _digest(document: Mapping[str, Any]) -> str:
-    body = {key: value for key, value in document.items() if key != 'sha256'}
-    text = json.dumps(body, sort_keys=True, separators=(',', ':'), allow_nan=False)
-    return hashlib.sha256(text.encode()).hexdigest()
-
-
-def _read(file: Path) -> dict[str, Any]:
-    try:
-        document = json.loads(file.read_bytes())
-    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
-        raise ValueError(f'damaged: {error}') from error
-    if not isinstance(document, dict) or document.get('format') != FORMAT:
-        raise ValueError(f'not in the format "{FORMAT}"')
-    try:
-        digest = _digest(document)
-    except ValueError as error:
-        raise ValueError(f'damaged: {error}') from error
-    if document.get('sha256') != digest:
-        raise ValueError('damaged: its sha256 does not fit its content')
-    if not isinstance(document.get('number'), int) or 'content' not in document:
-        raise ValueError('damaged: number or content are missing')
-    return document
-
-
-def _reference(content: Any) -> Reference:
-    known = {name: type(value) for name, value in asdict(Reference('', {}, {})).items()}
-    if not isinstance(content, dict) or set(content) != set(known):
+        learned, settings, signature = (
+            _mapping(content, name) for name in ('learned', 'settings', 'signature')
+        )
+        actuator, source, software, comment = (
+            _text(content, name) for name in ('actuator', 'source', 'software', 'comment')
+        )
+        created = number_of(content, 'created', 0.0, math.inf)
+        first, last = (
+            int(number_of(content, name, -LATEST, LATEST))
+            for name in ('first_stamp', 'last_stamp')
+        )
+    except KeyError as error:
+        raise ValueError(f'damaged: {error} is missing') from error
+    if len(content) != len(fields(Reference)):
         raise ValueError('damaged: fields are missing or unknown')
-    for name, value in content.items():
-        number = known[name] in (int, float) and isinstance(value, (int, float))
-        if not (number or isinstance(value, known[name])):
-            raise ValueError(f'damaged: {name} is no {known[name].__name__}')
-    return Reference(**content)
+    return Reference(
+        actuator, learned, settings, signature, source, first, last, created, software, comment
+    )
+
+
+def _mapping(content: Saved, name: str) -> Saved:
+    value = content[name]
+    if not isinstance(value, dict):
+        raise ValueError(f'damaged: {name} is no mapping')
+    return value
+
+
+def _text(content: Saved, name: str) -> str:
+    value = content[name]
+    if not isinstance(value, str):
+        raise ValueError(f'damaged: {name} is no text')
+    return value
 
 
 def _check(reference: Reference, actuator: str, settings: Settings, now: float) -> None:

@@ -73,7 +73,7 @@ def write_slot(path: Path | str, kind: str, content: Saved, *, both: bool = Fals
     files = sorted(
         (slot_file(path, name) for name in NAMES), key=lambda file: numbers.get(file, -1)
     )
-    body = {'format': kind, 'number': max([-1, *numbers.values()]) + 1, 'content': content}
+    body: Saved = {'format': kind, 'number': max([-1, *numbers.values()]) + 1, 'content': content}
     text = json.dumps({**body, 'sha256': _digest(body)}, indent=1, allow_nan=False)
     for file in files if both else files[:1]:
         replace_file(file, text)

@@ -5,21 +5,26 @@
 import hashlib
 import json
 import math
-import os
+import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from damadics_fd.core.record import Saved
 from damadics_fd.core.signature.trend import TimeToLimit, Trend, fit_recent
+from damadics_fd.store.file_names import file_name
+from damadics_fd.store.slots import read_bounded, replace_file, set_aside
 
 QUANTITIES = ('spring', 'preload', 'friction')
-HEADER = 'stamp_ns,' + ','.join(f'{q},{q}_std' for q in QUANTITIES) + ',reference\n'
+COLUMNS = 'stamp_ns,' + ','.join(f'{q},{q}_std' for q in QUANTITIES) + ',reference'
+HEADER = f'{COLUMNS},crc32\n'
 INTERVAL = 900.0  # [s] between two points; the slow set forgets within some minutes of motion
 POINTS = 20_000  # a longer file is thinned when it is opened
+LARGEST = 1e6  # of a value; what is beyond was never measured
+LATEST = 2**31 * 10**9  # ns
 
 
 @dataclass(frozen=True)
@@ -59,7 +64,7 @@ def _span(seconds: float) -> str:
     return f'{seconds:.0f} s'
 
 
-def series_name(signature: Mapping[str, Any]) -> str:
+def series_name(signature: Saved) -> str:
     """
     Name the series of the points that are measured against a reference.
 
@@ -73,28 +78,24 @@ class TrendFile:
     """
     Keep the points of one actuator in a CSV file that only grows.
 
-    A line that a crash has cut is skipped and counted in `unreadable`. Points belong to the
-    reference they were measured against; a new reference or a clock that was set back starts
-    a new series.
+    Each line ends in its checksum. One that a crash has cut, or that holds what is never written,
+    is skipped and counted in `unreadable`; what is no text file at all is moved aside. Points
+    belong to the reference they were measured against; a new reference or a clock that was set
+    back starts a new series.
 
     :param folder: where the references are; created where it is missing.
-    :param actuator: tag; also the name of the file.
+    :param actuator: tag; names the file.
     :param reference: identity of the reference, e.g. its hash.
     :param interval: [s] least time between two points.
-    :raises ValueError: if the tag cannot be part of a file name.
+    :raises OSError: where the file cannot be read, nor moved aside.
     """
 
     def __init__(
         self, folder: Path, actuator: str, reference: str, interval: float = INTERVAL
     ) -> None:
-        if not actuator or set(actuator) & set('/\\\0') or actuator in ('.', '..'):
-            raise ValueError(
-                f'actuator tag {actuator!r} cannot be part of a file name; '
-                'use letters, digits, "_" and "-"'
-            )
         if set(reference) & set(',\n\r'):
             raise ValueError(f'reference {reference!r} must not contain a comma or a line break')
-        self.path = Path(folder) / f'{actuator}.trend.csv'
+        self.path = Path(folder) / f'{file_name(actuator)}.trend.csv'
         self.reference = reference
         self.interval = interval
         self.unreadable = 0
@@ -111,17 +112,17 @@ class TrendFile:
         :return: True if the point was written.
         :raises OSError: if the file cannot be written.
         """
-        if not all(map(math.isfinite, (*change, *std))) or min(std) <= 0.0:
+        if not _plausible(stamp, change, std):
             return False
         t = stamp * 1e-9
         if self._rows and 0.0 <= t - self._rows[-1][0] < self.interval:
             return False
-        pairs = ','.join(f'{c:.6g},{s:.3g}' for c, s in zip(change, std, strict=True))
+        values = [v for pair in zip(change, std, strict=True) for v in pair]
         self.path.parent.mkdir(parents=True, exist_ok=True)
         new = not self.path.exists()
         with self.path.open('a', encoding='utf-8') as file:
-            file.write((HEADER if new else '') + f'{stamp},{pairs},{self.reference}\n')
-        self._append((t, *(v for pair in zip(change, std, strict=True) for v in pair)))
+            file.write((HEADER if new else '') + _line(stamp, values, self.reference))
+        self._append((t, *values))
         return True
 
     def points(self, quantity: str) -> tuple[NDArray[np.float64], ...]:
@@ -160,19 +161,23 @@ class TrendFile:
         self._rows.append(row)
 
     def _load(self) -> None:
-        if not self.path.exists():
+        try:
+            text = read_bounded(self.path).decode('utf-8', 'replace')
+            if text and not text.startswith(COLUMNS[: len(text)]):
+                raise ValueError('this is no file of trends')
+        except FileNotFoundError:
             return
-        text = self.path.read_text(encoding='utf-8', errors='replace')
+        except (OSError, ValueError):
+            set_aside(self.path)
+            self.unreadable += 1
+            return
         for line in text.splitlines()[1:]:
-            *numbers, reference = line.split(',')
             try:
-                stamp, *values = map(float, numbers)
+                stamp, values, reference = _read(line)
             except ValueError:
                 self.unreadable += 1
                 continue
-            if len(values) != 2 * len(QUANTITIES):
-                self.unreadable += 1
-            elif reference == self.reference:
+            if reference == self.reference:
                 self._append((stamp * 1e-9, *values))
         if text and not text.endswith('\n'):
             with self.path.open('a', encoding='utf-8') as file:
@@ -181,15 +186,45 @@ class TrendFile:
             self._thin()
 
     def _thin(self) -> None:
-        """Keep every second point of the older half; the replacement is atomic."""
+        """Keep every second point of the older half."""
         half = len(self._rows) // 2
         self._rows = self._rows[:half:2] + self._rows[half:]
-        temporary = self.path.with_suffix('.tmp')
-        with temporary.open('w', encoding='utf-8') as file:
-            file.write(HEADER)
-            for t, *values in self._rows:
-                numbers = ','.join(f'{v:.6g}' for v in values)
-                file.write(f'{round(t * 1e9)},{numbers},{self.reference}\n')
-            file.flush()
-            os.fsync(file.fileno())
-        temporary.replace(self.path)
+        lines = [_line(round(t * 1e9), values, self.reference) for t, *values in self._rows]
+        replace_file(self.path, HEADER + ''.join(lines))
+
+
+def _line(stamp: int, values: Sequence[float], reference: str) -> str:
+    numbers = ','.join(f'{v:.6g}' for v in values)
+    text = f'{stamp},{numbers},{reference}'
+    return f'{text},{zlib.crc32(text.encode()):08x}\n'
+
+
+def _read(line: str) -> tuple[int, list[float], str]:
+    """
+    Read one line, of version 0.1 without its checksum too.
+
+    :raises ValueError: where it is not what `_line` writes.
+    """
+    words = line.split(',')
+    if len(words) == 3 + 2 * len(QUANTITIES):
+        text, _, check = line.rpartition(',')
+        if check != f'{zlib.crc32(text.encode()):08x}':
+            raise ValueError('its checksum does not fit')
+        words.pop()
+    stamp, *numbers, reference = words
+    values = [float(word) for word in numbers]
+    if len(values) != 2 * len(QUANTITIES):
+        raise ValueError('numbers are missing')
+    if not _plausible(int(stamp), values[::2], values[1::2]):
+        raise ValueError('no such point is ever written')
+    return int(stamp), values, reference
+
+
+def _plausible(stamp: int, change: Sequence[float], std: Sequence[float]) -> bool:
+    """Tell whether a point may be a measurement."""
+    values = (*change, *std)
+    return (
+        abs(stamp) <= LATEST
+        and all(math.isfinite(v) and abs(v) <= LARGEST for v in values)
+        and min(std) > 1.0 / LARGEST
+    )

@@ -1,6 +1,7 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
 import math
+import os
 
 import numpy as np
 import pytest
@@ -106,7 +107,64 @@ def test_bad_points_and_names_are_refused(tmp_path):
     file = TrendFile(tmp_path, 'V', 'r')
     assert not file.add(0, (math.nan, 0.0, 0.0), STD)
     assert not file.path.exists()
-    with pytest.raises(ValueError, match='file name'):
-        TrendFile(tmp_path, '../V', 'r')
+    assert TrendFile(tmp_path, '../V/1', 'r').path.parent == tmp_path
     with pytest.raises(ValueError, match='comma'):
         TrendFile(tmp_path, 'V', 'a,b')
+
+
+BAD = ['nan', 'inf', '-inf', '1e308', '0', '-1', '', 'x', '1e999', '5' * 5000]
+
+
+@pytest.mark.parametrize('bad', BAD)
+@pytest.mark.parametrize('column', ['stamp', 'value', 'std', 'all'])
+def test_a_line_that_was_never_written_is_skipped_and_counted(tmp_path, column, bad):
+    file = TrendFile(tmp_path, 'V', 'r')
+    for k in range(20):
+        file.add(k * 10**12, (0.1 + 1e-3 * k, 0.2, 0.3), STD)
+    words = ['21000000000000', '0.1', '0.001', '0.2', '2', '0.3', '0.02', 'r']
+    for n in {'stamp': [0], 'value': [1], 'std': [2, 4], 'all': range(7)}[column]:
+        words[n] = bad
+    with file.path.open('a') as stream:
+        stream.write(','.join(words) + '\n')
+    again = TrendFile(tmp_path, 'V', 'r')
+    outlook = again.outlook({'spring': [-0.1, 0.5]}, 20e3)
+    assert all(math.isfinite(o.value) for o in outlook)
+    allowed = (column, bad) in {('value', '0'), ('value', '-1'), ('stamp', '0'), ('stamp', '-1')}
+    assert again.unreadable == (0 if allowed else 1)
+
+
+def test_a_changed_digit_is_noticed(tmp_path):
+    file = TrendFile(tmp_path, 'V', 'r')
+    file.add(10**12, (0.1, 0.2, 0.3), STD)
+    file.path.write_text(file.path.read_text().replace('0.2', '0.9'))
+    again = TrendFile(tmp_path, 'V', 'r')
+    assert (again.unreadable, len(again.points('spring')[0])) == (1, 0)
+
+
+def test_a_file_of_0_1_is_read(tmp_path):
+    file = TrendFile(tmp_path, 'V', 'r')
+    file.path.write_text(
+        'stamp_ns,spring,spring_std,preload,preload_std,friction,friction_std,reference\n'
+        '1000000000000,0.1,0.001,0.2,2,0.3,0.02,r\n'
+    )
+    again = TrendFile(tmp_path, 'V', 'r')
+    assert list(again.points('friction')[1]) == [0.3]
+    assert again.add(2 * 10**12, (0.1, 0.2, 0.3), STD)
+    assert len(TrendFile(tmp_path, 'V', 'r').points('friction')[1]) == 2
+
+
+@pytest.mark.parametrize('kind', ['folder', 'garbage', 'pipe', 'loop', 'null'])
+def test_what_is_no_file_of_trends_is_moved_aside(tmp_path, kind):
+    path = tmp_path / 'V.trend.csv'
+    make = {
+        'folder': path.mkdir,
+        'garbage': lambda: path.write_bytes(bytes(range(256)) * 10),
+        'pipe': lambda: os.mkfifo(path),
+        'loop': lambda: path.symlink_to(path),
+        'null': lambda: path.symlink_to('/dev/null'),
+    }
+    make[kind]()
+    file = TrendFile(tmp_path, 'V', 'r')
+    assert file.unreadable == 1
+    assert file.add(10**12, (0.1, 0.2, 0.3), STD)
+    assert len(list(tmp_path.glob('V.trend.csv.bad-*'))) == 1

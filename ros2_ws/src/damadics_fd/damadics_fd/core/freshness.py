@@ -1,0 +1,123 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""How old a judgement is, by the stamp that it rests on, and stamps that jump ahead."""
+
+import math
+from typing import Generic, TypeVar
+
+from damadics_fd.core.stamps import SECOND, is_date
+
+LEAST_MAX_AGE = 2.0  # s
+PERIODS = 3.0  # sample periods; slower samples are that old by nature
+BACK = 1.0  # s that stamps may be out of order without being another run
+PAUSED = 30.0  # s of an even delay after which a source of simulated stamps has been paused
+EVEN = 0.5  # s
+INTERRUPTED = 1.0  # s without a sample
+JUMP = 60.0  # s that a stamp may run ahead of the time that has passed
+AGREEING = 3  # samples in a row that make a jump ahead credible
+
+Item = TypeVar('Item')
+
+
+def default_max_age(period: float) -> float:
+    """
+    Return the age from which a judgement is not healthy any more.
+
+    :param period: of the samples [s].
+    :return: the age [s].
+    """
+    return max(LEAST_MAX_AGE, PERIODS * period)
+
+
+class Freshness:
+    """
+    The age of what was heard last: clock less stamp where the stamp is a date.
+
+    With simulated time the clock is that of /clock, for all stamps. Other stamps count from the
+    start of a run: for them the age is what clock less stamp exceeds its smallest value since the
+    source was first heard by, so that a queue that grows shows. A source that was paused, which
+    then runs on with an even delay, is counted anew after half a minute.
+
+    :param simulated: the clock is that of /clock.
+    """
+
+    def __init__(self, simulated: bool = False) -> None:
+        self._simulated = simulated
+        self._stamp: int | None = None
+        self._steady = 0.0  # when it was heard [s]
+        self._least = math.inf  # of steady time less stamp [s]
+        self._even = self._even_since = 0.0
+
+    def heard(self, stamp: int, steady: float) -> None:
+        """
+        Note a sample.
+
+        :param stamp: of its measurement [ns].
+        :param steady: time of a clock that is never set [s].
+        """
+        before, self._stamp = self._stamp, stamp
+        delay = steady - stamp / SECOND
+        if before is None or stamp < before - BACK * SECOND or is_date(before) != is_date(stamp):
+            self._least, self._even, self._even_since = delay, delay, steady
+        elif delay < self._least:
+            self._least = delay
+        if abs(delay - self._even) > EVEN or steady - self._steady > INTERRUPTED:
+            self._even, self._even_since = delay, steady
+        elif steady - self._even_since > PAUSED:
+            self._least = max(self._least, min(delay, self._even))
+        self._steady = steady
+
+    def age(self, clock: int, steady: float) -> float:
+        """
+        Return the age of the newest sample.
+
+        :param clock: ROS time now [ns].
+        :param steady: as for `heard`, now [s].
+        :return: age [s], infinite before the first; negative where the stamp is in the future.
+        """
+        if self._stamp is None:
+            return math.inf
+        if self._simulated or is_date(self._stamp):
+            return (clock - self._stamp) / SECOND
+        return steady - self._stamp / SECOND - self._least
+
+
+class ForwardJumps(Generic[Item]):
+    """
+    Hold a sample whose stamp runs far ahead of time until others agree with it.
+
+    One wrong stamp would otherwise end a shelf and start the filters afresh.
+    """
+
+    def __init__(self) -> None:
+        self.refused = 0  # samples that no other agreed with
+        self._last: int | None = None  # stamp of the latest sample that was let through [ns]
+        self._steady = 0.0  # when [s]
+        self._held: list[tuple[int, Item]] = []
+
+    def admit(self, stamp: int, item: Item, steady: float) -> list[Item]:
+        """
+        Take a sample.
+
+        :param stamp: of its measurement [ns].
+        :param item: the sample.
+        :param steady: time of a clock that is never set [s].
+        :return: what may be judged now, in order; mostly the sample itself.
+        """
+        last = self._last
+        if last is None or stamp - last <= (steady - self._steady + JUMP) * SECOND:
+            if self._held:
+                self.refused += len(self._held)
+                self._held.clear()
+            self._last, self._steady = stamp, steady
+            return [item]
+        if self._held and not 0 < stamp - self._held[-1][0] <= JUMP * SECOND:
+            self.refused += len(self._held)
+            self._held.clear()
+        self._held.append((stamp, item))
+        if len(self._held) < AGREEING:
+            return []
+        released = [one for _, one in self._held]
+        self._held.clear()
+        self._last, self._steady = stamp, steady
+        return released

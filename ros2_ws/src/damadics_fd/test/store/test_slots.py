@@ -1,0 +1,106 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""PR-2: a file that has to survive is read whole and unchanged, or not at all."""
+
+import json
+import os
+
+import pytest
+from damadics_fd.store.slots import check_folder, read_slots, set_aside, write_slot
+from hypothesis import given
+from hypothesis import strategies as st
+
+KIND = 'damadics_fd test 1'
+CONTENT = {'active': True, 'peak': 1.5, 'recent': [1, -1], 'text': 'packing', 'deep': {'a': None}}
+
+
+def contents(path):
+    return [slot.content for slot in read_slots(path, KIND) if slot.content is not None]
+
+
+def problems(path):
+    return [slot.problem for slot in read_slots(path, KIND) if slot.problem]
+
+
+def test_both_slots_hold_the_newest_where_it_matters(tmp_path):
+    path = tmp_path / 'v'
+    write_slot(path, KIND, {'n': 1}, both=True)
+    write_slot(path, KIND, {'n': 2}, both=True)
+    assert contents(path) == [{'n': 2}, {'n': 2}]
+    write_slot(path, KIND, {'n': 3})
+    assert contents(path) == [{'n': 3}, {'n': 2}]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ['v.a.json', 'v.b.json']
+
+
+@given(st.data())
+def test_any_damage_is_noticed(tmp_path_factory, data):
+    path = tmp_path_factory.mktemp('slots') / 'v'
+    file = write_slot(path, KIND, CONTENT)
+    whole = file.read_bytes()
+    damaged = bytearray(whole)
+    for _ in range(data.draw(st.integers(1, 4))):
+        place = data.draw(st.integers(0, len(damaged)))
+        length = data.draw(st.integers(0, 40))
+        damaged[place : place + length] = data.draw(st.binary(max_size=40))
+    file.write_bytes(damaged)
+    assert contents(path) in ([], [CONTENT]), 'half of it was read'
+    assert contents(path) or problems(path)
+
+
+@pytest.mark.parametrize(
+    'text',
+    [
+        '',
+        '{',
+        '[' * 100_000,
+        '{"a":' * 100_000,
+        '1' * 5000,
+        '{"number": NaN}',
+        '{"number": Infinity}',
+        'null',
+        '\x00' * 300,
+        json.dumps({'format': KIND, 'number': -5, 'content': {}}),
+        json.dumps({'format': KIND, 'number': 10**400, 'content': []}),
+    ],
+    ids=lambda text: text[:12],
+)
+def test_hostile_text_is_damage(tmp_path, text):
+    (tmp_path / 'v.a.json').write_text(text)
+    assert contents(tmp_path / 'v') == []
+    assert len(problems(tmp_path / 'v')) == 1
+
+
+@pytest.mark.parametrize('kind', ['folder', 'loop', 'null', 'zero', 'pipe', 'nothing', 'huge'])
+def test_what_is_no_file_is_damage_and_is_replaced(tmp_path, kind):
+    file = tmp_path / 'v.a.json'
+    make = {
+        'folder': file.mkdir,
+        'loop': lambda: file.symlink_to(file),
+        'null': lambda: file.symlink_to('/dev/null'),
+        'zero': lambda: file.symlink_to('/dev/zero'),
+        'pipe': lambda: os.mkfifo(file),
+        'nothing': lambda: file.symlink_to(tmp_path / 'nowhere'),
+        'huge': lambda: os.truncate(os.open(file, os.O_CREAT | os.O_WRONLY), 2**40),
+    }
+    make[kind]()
+    assert len(problems(tmp_path / 'v')) == 1
+    aside = set_aside(file)
+    assert os.path.lexists(aside)
+    assert read_slots(tmp_path / 'v', KIND) == []
+    write_slot(tmp_path / 'v', KIND, CONTENT, both=True)
+    assert contents(tmp_path / 'v') == [CONTENT] * 2
+
+
+def test_what_is_kept_aside_does_not_fill_the_disk(tmp_path):
+    for _ in range(50):
+        (tmp_path / 'v.a.json').write_text('x')
+        set_aside(tmp_path / 'v.a.json')
+    assert len(list(tmp_path.iterdir())) == 20
+
+
+def test_a_folder_that_cannot_be_written_is_told(tmp_path):
+    assert check_folder(tmp_path / 'new' / 'folder') == ''
+    assert list((tmp_path / 'new' / 'folder').iterdir()) == []
+    (tmp_path / 'file').write_text('')
+    for folder in (tmp_path / 'file' / 'x', '/dev/null/x', '/proc/x'):
+        assert str(folder) in check_folder(type(tmp_path)(folder))
