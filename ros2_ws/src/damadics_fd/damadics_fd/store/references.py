@@ -92,13 +92,13 @@ def save_reference(path: Path | str, reference: Reference, now: float | None = N
 
 
 def load_reference(
-    path: Path | str, actuator: str, settings: Settings, now: float | None = None
+    path: Path | str, actuator: str | None, settings: Settings, now: float | None = None
 ) -> Reference:
     """
     Read the newest good slot.
 
     :param path: path as for `save_reference`.
-    :param actuator: tag of the actuator it must belong to.
+    :param actuator: tag of the actuator it must belong to; None: of any.
     :param settings: the settings it must have been learned with.
     :param now: present time [s since 1970]; the clock's where it is None.
     :return: the reference.
@@ -158,8 +158,8 @@ def _text(content: Saved, name: str) -> str:
     return value
 
 
-def _check(reference: Reference, actuator: str, settings: Settings, now: float) -> None:
-    if reference.actuator != actuator:
+def _check(reference: Reference, actuator: str | None, settings: Settings, now: float) -> None:
+    if actuator is not None and reference.actuator != actuator:
         raise ValueError(f'belongs to {reference.actuator}, not to {actuator}')
     if reference.created > now + CLOCK_TOLERANCE or not math.isfinite(reference.created):
         raise ValueError(

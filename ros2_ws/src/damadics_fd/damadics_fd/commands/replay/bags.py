@@ -75,11 +75,14 @@ class Chain:
     Estimator and detector of a mode, as the nodes run them.
 
     :param settings: all settings.
+    :param learned: what the estimator begins with, as a reference keeps it; None: nothing.
     """
 
-    def __init__(self, settings: Settings):
+    def __init__(self, settings: Settings, learned: dict[str, Any] | None = None):
         self._settings = settings
         self._estimator = estimator_for(settings)
+        if learned is not None:
+            self._estimator.restore(learned)
         self._detector = Detector(settings, load_causes().classes)
 
     def take(self, columns: Columns) -> Result:
@@ -149,16 +152,18 @@ class Plan:
     :param settings: settings that differ from the defaults of the mode.
     :param figures: folder for pictures, None for none.
     :param bags: folder for bags with the flags, None for none.
+    :param learned: what the estimator begins with, as a reference keeps it; None: nothing.
     """
 
     mode: str = 'monitor'
     settings: dict[str, Any] = field(default_factory=dict)
     figures: Path | None = None
     bags: Path | None = None
+    learned: dict[str, Any] | None = None
 
     def chain(self) -> Chain:
         """Return estimator and detector in their first state."""
-        return Chain(Settings.for_mode(self.mode, **self.settings))
+        return Chain(Settings.for_mode(self.mode, **self.settings), self.learned)
 
 
 def replay(

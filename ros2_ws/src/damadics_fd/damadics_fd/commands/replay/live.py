@@ -39,9 +39,12 @@ class Player(Node):
 
     :param settings: of estimator and detector; None publishes the samples alone.
     :param rate: speed in multiples of real time.
+    :param learned: what the estimator begins with, as a reference keeps it; None: nothing.
     """
 
-    def __init__(self, settings: Settings | None, rate: float):
+    def __init__(
+        self, settings: Settings | None, rate: float, learned: dict[str, Any] | None = None
+    ):
         super().__init__('replay')
         self._rate = rate
         self._clock = self.create_publisher(Clock, '/clock', 10)
@@ -49,7 +52,10 @@ class Player(Node):
         self._state = self.create_publisher(FaultState, 'fault_state', qos.SAMPLES)
         self._judges = None
         if settings:
-            self._judges = estimator_for(settings), Detector(settings, load_causes().classes)
+            estimator = estimator_for(settings)
+            if learned is not None:
+                estimator.restore(learned)
+            self._judges = estimator, Detector(settings, load_causes().classes)
             self._estimate = self.create_publisher(EstimateMessage, 'estimate', qos.SAMPLES)
             self._residual = self.create_publisher(Float64Stamped, 'residual', qos.SAMPLES)
             self._threshold = self.create_publisher(Float64Stamped, 'threshold', qos.SAMPLES)
@@ -181,7 +187,7 @@ def publish(
     try:
         for recording in recordings:
             settings = Settings.for_mode(plan.mode, **plan.settings)
-            player = Player(None if inputs_only else settings, rate)
+            player = Player(None if inputs_only else settings, rate, plan.learned)
             player.wait_for_subscribers(inputs_only)
             with tqdm(unit=' samples', unit_scale=True, desc=recording.name, disable=None) as bar:
                 truth = recording.truth(lambda text: None)

@@ -9,6 +9,7 @@ import re
 import sys
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, wait
+from dataclasses import replace
 from itertools import chain, count
 from pathlib import Path
 from typing import Any
@@ -27,8 +28,10 @@ from damadics_fd.commands.replay.output import (
     write_outcomes,
 )
 from damadics_fd.core.modes import MODES
+from damadics_fd.core.scada.estimator import estimator_for
 from damadics_fd.core.settings import Settings, SettingsError
 from damadics_fd.ros.arguments import split_ros_args
+from damadics_fd.store.references import ReferenceFileError, load_reference
 
 EXAMPLES = """examples:
   ros2 run damadics_fd replay bags/dablib_friction.mcap --mode paper --figures figures
@@ -93,6 +96,13 @@ def arguments(args: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument(
         '--out', type=Path, metavar='FILE', help='write the result: .json, .csv or .parquet'
     )
+    parser.add_argument(
+        '--reference',
+        type=Path,
+        metavar='PATH',
+        help='begin with what was learned: the path that save_reference was given, without'
+        ' .a.json',
+    )
     parser.add_argument('--figures', type=Path, metavar='DIR', help='draw the six panels')
     parser.add_argument(
         '--bag',
@@ -151,6 +161,26 @@ def settings_of(options: argparse.Namespace) -> dict[str, Any]:
     return values
 
 
+def learned(options: argparse.Namespace, settings: dict[str, Any]) -> dict[str, Any] | None:
+    """
+    Read what the estimator begins with.
+
+    :param options: the command line.
+    :param settings: settings that the user gave.
+    :return: what was learned, None where no reference is named.
+    :raises ReferenceFileError: where there is no good reference for these settings.
+    """
+    if options.reference is None:
+        return None
+    wanted = Settings.for_mode(options.mode, **settings)
+    kept = load_reference(options.reference, None, wanted).learned
+    try:
+        estimator_for(wanted).restore(kept)
+    except ValueError as error:
+        raise ReferenceFileError(f'{options.reference}: {error}') from error
+    return kept
+
+
 def _parameters(path: Path) -> dict[str, Any]:
     """Read the settings out of a parameter file of the nodes."""
     try:
@@ -191,7 +221,9 @@ def main(args: list[str] | None = None) -> int:
         recordings = find_recordings(
             options.bags, options.topic, parse_maps(options.map), options.actuator, left_out
         )
-        plan = Plan(options.mode, settings, options.figures, options.bag)
+        plan = Plan(
+            options.mode, settings, options.figures, options.bag, learned(options, settings)
+        )
         if options.live:
             from damadics_fd.commands.replay.live import publish
 
@@ -205,7 +237,7 @@ def main(args: list[str] | None = None) -> int:
             report_problems(outcome.problems)
         if options.out:
             write_outcomes(outcomes, options.out)
-    except (BagError, SettingsError, RuntimeError, OSError) as error:
+    except (BagError, SettingsError, ReferenceFileError, RuntimeError, OSError) as error:
         print(f'replay: {error}', file=sys.stderr)
         return 1
     except KeyboardInterrupt:
@@ -264,7 +296,7 @@ def _placed(plan: Plan, recording: Recording) -> Plan:
     """Put bags next to the input where no folder is given."""
     if plan.bags != BESIDE:
         return plan
-    return Plan(plan.mode, plan.settings, plan.figures, recording.path.resolve().parent)
+    return replace(plan, bags=recording.path.resolve().parent)
 
 
 def unique_stems(recordings: Sequence[Recording]) -> Iterator[str]:

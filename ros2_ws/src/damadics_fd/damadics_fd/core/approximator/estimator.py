@@ -190,13 +190,16 @@ class Estimator:
         :return: plain numbers and lists by name, fit for JSON.
         :raises ValueError: where learning is not finished.
         """
-        if not self.state[0].armed:
+        accepted = self.quality[0].counts[quality.ACCEPTED]
+        if not (accepted if self.settings.mode == 'paper' else self.state[0].armed):
             raise ValueError(f'nothing to save: {self.status}')
         return {name: self.state[name][0].tolist() for name in LEARNED}
 
     def restore(self, learned: Mapping[str, Any]) -> None:
         """
-        Take up what `learned` returned and go to MONITOR as soon as the filters have settled.
+        Take up what `learned` returned; go to MONITOR as soon as the filters have settled.
+
+        Mode paper has no learning to end: it adapts on from there.
 
         :param learned: what was learned.
         :raises ValueError: where it is not that, or beyond the bounds of the settings; the
@@ -215,7 +218,8 @@ class Estimator:
                 raise ValueError(f'learned state: {name} = {value!r} does not fit')
             state[name][0] = array
         self._check_bounds(state)
-        take_up(state)
+        if self.settings.mode != 'paper':
+            take_up(state)
         self.state[:] = state
 
     def relearn(self, after_repair: bool = False) -> None:
