@@ -17,8 +17,10 @@ from damadics_fd.core.signature.state import CAUSES
 from damadics_fd.store.trends import QUANTITIES
 
 NE107_NAMES = ('normal', 'maintenance', 'out_of_specification', 'function_check', 'failure')
-FIELDS = ('tag', 'value', 'margin', 'confidence', 'second')
-KEYS = ('text', 'advice', 'ne107')
+FIELDS = ('tag', 'value', 'less', 'factor', 'bar', 'margin', 'confidence', 'second')
+TEXTS = ('text', 'detail', 'advice')
+KEYS = (*TEXTS, 'ne107')
+LANGUAGES = ('en', 'de')
 MOST_CERTAIN = 0.99  # no text promises 100 %
 
 
@@ -42,13 +44,59 @@ class _Number(float):
         return 'unknown' if math.isnan(self) else super().__format__(spec)
 
 
+class _Zahl(float):
+    """The same in German."""
+
+    def __format__(self, spec: str) -> str:
+        if math.isnan(self):
+            return 'unbekannt'
+        return super().__format__(spec).replace('.', ',').replace('%', ' %')
+
+
 @dataclass(frozen=True)
 class Cause:
-    """Hold what the table says about one cause."""
+    """Hold what the table says about one cause: what is wrong, the numbers, what to do."""
 
     text: str
     advice: str
     ne107: int  # as in damadics_msgs/FaultFlag
+    detail: str = ''
+    language: str = 'en'
+
+    def words(
+        self,
+        value: float = math.nan,
+        std: float = math.nan,
+        confidence: float = math.nan,
+        second: str = 'none',
+        tag: str = '',
+    ) -> tuple[str, str, str]:
+        """
+        Fill in the texts.
+
+        :param value: change in the unit of the cause.
+        :param std: its standard deviation.
+        :param confidence: 0..1.
+        :param second: the likeliest cause while it is not certain.
+        :param tag: of the actuator.
+        :return: what is wrong and how much; the numbers, '' where none is known; what to do.
+        """
+        number = _Zahl if self.language == 'de' else _Number
+        words = {
+            'tag': tag,
+            'value': number(value),
+            'less': number(-value),
+            'factor': number(1.0 + value),
+            'bar': number(value * 1e-5),
+            'margin': number(2.0 * std),
+            'confidence': number(min(confidence, MOST_CERTAIN)),
+            'second': second.replace('_', ' '),
+        }
+        known = [] if math.isnan(value) or not self.detail else [self.detail.format(**words)]
+        if not math.isnan(confidence):
+            sure = 'Wahrscheinlichkeit' if self.language == 'de' else 'confidence'
+            known.append(f'{sure} {words["confidence"]:.0%}')
+        return self.text.format(**words), ', '.join(known), self.advice.format(**words)
 
     def describe(
         self,
@@ -59,23 +107,18 @@ class Cause:
         second: str = 'none',
     ) -> tuple[str, str]:
         """
-        Fill in the texts.
+        Fill in the texts for a list or a log, where the actuator has to be named.
 
         :param tag: of the actuator.
         :param value: change in the unit of the cause.
         :param std: its standard deviation.
         :param confidence: 0..1.
         :param second: the likeliest cause while it is not certain.
-        :return: text, advice.
+        :return: text with its numbers, advice.
         """
-        words = {
-            'tag': tag,
-            'value': _Number(value),
-            'margin': _Number(2.0 * std),
-            'confidence': _Number(min(confidence, MOST_CERTAIN)),
-            'second': second.replace('_', ' '),
-        }
-        return self.text.format(**words), self.advice.format(**words)
+        text, numbers, advice = self.words(value, std, confidence, second, tag)
+        named = text if '{tag}' in self.text else f'{tag}: {text}'
+        return (f'{named} ({numbers})' if numbers else named), advice
 
 
 @dataclass(frozen=True)
@@ -95,20 +138,26 @@ class CauseTable:
         return self.causes[cause]
 
 
-def load_causes(path: Path | None = None) -> CauseTable:
+def load_causes(path: Path | None = None, language: str = 'en') -> CauseTable:
     """
     Load the table of the package and, over it, the user's.
 
     :param path: YAML file of the user.
+    :param language: one of LANGUAGES, for what the user's file leaves out.
     :return: the table.
     :raises CauseTableError: listing everything that is wrong in the user's file.
     :raises OSError: if the file cannot be read.
 
     >>> load_causes()['spring_softer'].describe('LV-101', -0.05, 0.0005, 0.99)[0]
-    'LV-101: spring softer by -5.0% +- 0.1% (confidence 99%)'
+    'LV-101: The spring is 5.0% softer than learned. (-5.0% ± 0.1%, confidence 99%)'
     """
     standard = resources.files('damadics_fd').joinpath('causes.yaml').read_text('utf-8')
     causes, limits = _parse(yaml.safe_load(standard), 'causes.yaml')
+    if language != 'en':
+        name = f'causes.{language}.yaml'
+        texts = resources.files('damadics_fd').joinpath(name).read_text('utf-8')
+        translated, _ = _parse(yaml.safe_load(texts), name, causes)
+        causes |= {key: replace(cause, language=language) for key, cause in translated.items()}
     if path is not None:
         try:
             content = yaml.safe_load(Path(path).read_text('utf-8'))
@@ -164,7 +213,7 @@ def _is_limit(value: Any) -> bool:
 
 def _cause(name: str, entry: dict[str, Any], default: Cause | None, problems: list[str]) -> Cause:
     texts = {}
-    for key in ('text', 'advice'):
+    for key in TEXTS:
         texts[key] = entry.get(key, getattr(default, key, ''))
         problem = _template_problem(texts[key])
         if problem:
@@ -177,7 +226,8 @@ def _cause(name: str, entry: dict[str, Any], default: Cause | None, problems: li
     else:
         problems.append(f'{name}: ne107 {level!r} is not one of {", ".join(NE107_NAMES)}')
         ne107 = 0
-    return Cause(str(texts['text']), str(texts['advice']), ne107)
+    language = default.language if default is not None else 'en'
+    return Cause(str(texts['text']), str(texts['advice']), ne107, str(texts['detail']), language)
 
 
 def _template_problem(text: Any) -> str:
@@ -188,7 +238,7 @@ def _template_problem(text: Any) -> str:
         unknown = [name for name in names if name not in FIELDS]
         if unknown:
             return f'unknown field {{{unknown[0]}}}; known are {", ".join(FIELDS)}'
-        text.format(tag='', value=1.0, margin=1.0, confidence=1.0, second='')
+        text.format(**dict.fromkeys(FIELDS, 1.0) | {'tag': '', 'second': ''})
     except (ValueError, IndexError, KeyError) as error:
         return str(error)
     return ''
@@ -207,4 +257,16 @@ def explain(event: Event, table: CauseTable, tag: str) -> Event:
         return event
     cause = table[event.cause]
     text, advice = cause.describe(tag, event.strength, event.spread, event.confidence)
-    return replace(event, text=f'{text}; {event.text}', advice=advice)
+    return replace(event, text=f'{text} {found_by(event.ratio)} [{event.text}]', advice=advice)
+
+
+def found_by(ratio: float) -> str:
+    """
+    Say who found a change that the signature has a cause for.
+
+    :param ratio: largest residual / threshold of the fault.
+    :return: one sentence.
+    """
+    if ratio >= 1.0:
+        return 'Found by the threshold, named by the valve signature.'
+    return 'Found by the valve signature.'

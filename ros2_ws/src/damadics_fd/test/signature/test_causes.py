@@ -18,8 +18,18 @@ def test_every_cause_has_a_text_for_known_and_unknown_numbers():
         text, _ = table[name].describe('LV-101', 0.25, 0.01, 0.99, 'spring_softer')
         assert '{' not in text
     assert table['friction_up'].describe('V', 0.25, 0.01, 0.99)[0] == (
-        'V: friction up by +25% +- 2% (confidence 99%)'
+        'V: Friction is 1.2 times normal. (+25% ± 2%, confidence 99%)'
     )
+    german = load_causes(language='de')
+    assert german['friction_up'].words(1.65, 0.195, 0.99) == (
+        'Die Reibung beträgt das 2,6-Fache des Normalen.',
+        '+165 % ± 39 %, Wahrscheinlichkeit 99 %',
+        'Packung prüfen: Stopfbuchse zu fest, trocken, oder Ablagerungen an der Spindel.',
+    )
+    for name in CAUSES:
+        english, other = table[name], german[name]
+        assert (name, other.ne107) == (name, english.ne107)
+        assert bool(other.advice) == bool(english.advice) and other.text != english.text
 
 
 def test_a_users_file_replaces_only_what_it_names(tmp_path):
@@ -93,7 +103,10 @@ def test_an_event_is_worded_by_its_cause():
         table,
         'V',
     )
-    assert named.text == 'V: spring softer by -5.0% +- 0.2% (confidence 99%); raised'
+    assert named.text == (
+        'V: The spring is 5.0% softer than learned. (-5.0% ± 0.2%, confidence 99%) '
+        'Found by the threshold, named by the valve signature. [raised]'
+    )
     assert 'crack' in named.advice
 
 
