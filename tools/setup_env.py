@@ -96,7 +96,7 @@ def requirement_files(ros_installed: bool) -> list[Path]:
     :param ros_installed: an installed ROS 2 is used.
     :return: paths of requirement files.
     """
-    names = ['project', 'dashboard', 'test']
+    names = ['project', 'dashboard', 'connect', 'test']
     if not ros_installed:
         names.insert(0, 'ros')
     return [REQUIREMENTS / f'{name}.txt' for name in names]

@@ -1,0 +1,255 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Join the signals of one valve, which a source sends one by one, to samples on the valve's clock.
+
+A source sends what changes. Signals that change within one period are one sample, stamped with the
+newest source time in it. While the source is known to be alive, no change is not silence: the last
+value holds, and a sample of held values follows each period. No clock is read here: every call
+says what time it is on a clock that nobody sets.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from damadics_fd.core.sample import SIGNALS
+
+NANO = 1_000_000_000
+DRIFT = 200e-6  # of the source's clock against ours
+STEP = NANO  # ns; stamps further back than this may be a clock set back, others are only late
+LONGEST_FILL = 2 * NANO  # ns, or three periods: a longer pause is a gap, not a hold
+DAY = 86_400 * NANO
+WAIT = 2 * NANO  # ns for the first values of all signals
+NAN = math.nan
+Emit = Callable[[int, list[float]], None]
+
+
+@dataclass
+class Tally:
+    """What was done with the values of one valve."""
+
+    samples: int = 0
+    held: int = 0  # samples without a change
+    late: int = 0  # values older than what had been taken in
+    repeated: int = 0  # values sent twice
+    future: int = 0  # stamps more than a day ahead
+    steps: int = 0  # of the source's clock
+    gaps: int = 0
+    last_gap: tuple[int, int] = (0, 0)  # stamps around it [ns]
+    bad: dict[str, str] = field(default_factory=dict)  # why, by signal
+    uncertain: dict[str, int] = field(default_factory=dict)  # how often, by signal
+
+
+class Joiner:
+    """
+    The joined signals of one valve.
+
+    :param period: of the valve's clock [ns].
+    :param settle: how much later than the first change of a sample its others may arrive [ns].
+    :param signals: numbers in `SIGNALS` of those that the source has.
+    :param emit: takes stamp [ns] and the values of all of `SIGNALS`; the list is its own.
+    """
+
+    def __init__(self, period: int, settle: int, signals: tuple[int, ...], emit: Emit) -> None:
+        self.tally = Tally()
+        self.newest = 0  # source time of the newest value taken in [ns]
+        self._period = period
+        self._settle = settle
+        self._emit = emit
+        self._expected = sum(1 << slot for slot in signals)
+        self._values = [NAN] * len(SIGNALS)
+        self._times = [0] * len(SIGNALS)
+        self._back = [0] * len(SIGNALS)
+        self._known = 0  # signals that have a value since the session began
+        self._group: list[tuple[int, float]] = []
+        self._mask = 0
+        self._start = self._end = self._opened = 0
+        self._last = 0  # stamp of the last sample
+        self._sent_at = 0
+        self._alive_since = 0
+        self._ahead: int | None = None  # source's clock less ours
+        self._ahead_at = 0
+        self._resumed = False
+        self._first = True  # no sample since the session began
+
+    @property
+    def last(self) -> int:
+        """Stamp of the last sample [ns], 0 before the first."""
+        return self._last
+
+    @property
+    def waiting_for(self) -> tuple[str, ...]:
+        """Signals that have sent nothing since the session began."""
+        missing = self._expected & ~self._known
+        return tuple(name for slot, name in enumerate(SIGNALS) if missing >> slot & 1)
+
+    def begin(self, now: int) -> None:
+        """
+        A session has begun: wait for the present values of all signals.
+
+        :param now: [ns].
+        """
+        self._known = self._mask = 0
+        self._group.clear()
+        self._alive_since = now
+        self._resumed = self._last > 0
+        self._first = True
+        self._ahead = None
+        self._ahead_at = now
+
+    def source_clock(self, source_now: int, now: int) -> None:
+        """
+        Take the source's clock, as long as no change has told the time.
+
+        :param source_now: [ns].
+        :param now: [ns].
+        """
+        if self._ahead is None:
+            self._ahead = source_now - now
+            self._ahead_at = now
+
+    def without(self, slot: int) -> None:
+        """Go on without a signal that the source does not have."""
+        self._expected &= ~(1 << slot)
+        self._values[slot] = NAN
+
+    def take(self, slot: int, stamp: int, value: float, now: int) -> None:
+        """
+        Take in one value; those of one batch in the order of their stamps.
+
+        :param slot: number in `SIGNALS`.
+        :param stamp: source time [ns].
+        :param value: scaled; NaN for a bad one.
+        :param now: [ns].
+        """
+        before = self._times[slot]
+        bit = 1 << slot
+        if stamp <= before:
+            if stamp == before:
+                held = self._values[slot]
+                if value == held or (value != value and held != held):
+                    self.tally.repeated += bool(self._known & bit)
+                    self._known |= bit
+                    return
+            elif not self._set_back(slot, stamp, before, now):
+                return
+        ahead = self._ahead
+        if ahead is not None and stamp - now - ahead > DAY:
+            self.tally.future += 1
+            stamp = now + ahead
+        if self._group and (
+            stamp - self._start >= self._period
+            or (self._mask & bit and 2 * (stamp - self._start) >= self._period)
+        ):
+            self._close(now)
+        if not self._group:
+            self._start = self._end = stamp
+            self._opened = now
+        self._group.append((slot, value))
+        self._mask |= bit
+        self._known |= bit
+        self._times[slot] = stamp
+        if stamp > self._end:
+            self._end = stamp
+        if self._mask == self._expected:
+            self._close(now)
+
+    def look(self, now: int) -> None:
+        """
+        Emit what is due; call it often, and only while the source is alive.
+
+        :param now: [ns].
+        """
+        if self._group and now - self._opened >= self._settle:
+            self._close(now)
+        if self._group or not self._complete(now) or self._ahead is None:
+            return
+        due = now + self._ahead - self._period - self._settle
+        if not self._last or due - self._last > max(LONGEST_FILL, 3 * self._period):
+            newest = max(self._times)
+            if newest > due:
+                due = newest
+            if due > self._last:
+                self._tell_gap(due)
+                self._send(due, now, held=due != newest)
+            return
+        while self._last <= due:
+            self._send(self._last + self._period, now, held=True)
+
+    def _close(self, now: int) -> None:
+        """End the present sample: fill the time before it, apply it, send it."""
+        start, end = self._start, self._end
+        ahead = end - now
+        if self._ahead is None:
+            self._ahead = ahead
+        else:
+            drifted = self._ahead - int((now - self._ahead_at) * DRIFT)
+            self._ahead = ahead if ahead > drifted else drifted
+        self._ahead_at = now
+        complete = self._complete(now)
+        if complete and self._last and not self._resumed:
+            self._fill(start, now)
+        for slot, value in self._group:
+            self._values[slot] = value
+        self._group.clear()
+        self._mask = 0
+        if self._first and now + self._ahead - end > self._period + self._settle:
+            return  # a value of long ago, as every session begins with: it is held from now on
+        if complete and end > self._last:
+            if self._last:
+                self._tell_gap(end)
+            self._send(end, now, held=False)
+        elif end <= self._last:
+            self._ahead = ahead  # a held sample came too early: the clock was set back a little
+
+    def _complete(self, now: int) -> bool:
+        return not self._expected & ~self._known or now - self._alive_since > WAIT
+
+    def _fill(self, start: int, now: int) -> None:
+        """Send held values for the periods since the last sample in which nothing changed."""
+        pause = start - self._last
+        if 2 * pause <= 3 * self._period:
+            return
+        if pause > max(LONGEST_FILL, 3 * self._period):
+            return
+        if pause > now - self._sent_at + self._settle + self._period:
+            return  # the source's clock was set forward: no such time has passed
+        for _ in range(round(pause / self._period) - 1):
+            self._send(self._last + self._period, now, held=True)
+
+    def _tell_gap(self, stamp: int) -> None:
+        if stamp - self._last > max(LONGEST_FILL, 3 * self._period) and self._last:
+            self.tally.gaps += 1
+            self.tally.last_gap = (self._last, stamp)
+        self._resumed = False
+
+    def _set_back(self, slot: int, stamp: int, before: int, now: int) -> bool:
+        """Tell a clock that was set back from a value that is late: it goes on from there."""
+        step = max(STEP, 3 * self._period)
+        back = self._back[slot]
+        if not back or stamp <= back:
+            self._back[slot] = stamp if before - stamp >= step else 0
+            self._known |= 1 << slot
+            self.tally.late += 1
+            return False
+        self._close_before_step(now)
+        self.tally.steps += 1
+        self._ahead = stamp - now
+        self._ahead_at = now
+        self._times = [min(each, stamp - 1) for each in self._times]
+        self._back = [0] * len(SIGNALS)
+        self._last = 0
+        return True
+
+    def _close_before_step(self, now: int) -> None:
+        if self._group:
+            self._close(now)
+
+    def _send(self, stamp: int, now: int, held: bool) -> None:
+        self._last = stamp
+        self._first = False
+        self._sent_at = now
+        self.tally.samples += 1
+        self.tally.held += held
+        self._emit(stamp, self._values.copy())

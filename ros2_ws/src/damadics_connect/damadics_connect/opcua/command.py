@@ -1,0 +1,146 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Command `opcua`: signals from an OPC UA server, judgements to OPC UA clients."""
+
+import argparse
+import asyncio
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from damadics_fd.ros.arguments import command_parser, split_ros_args
+
+from damadics_connect.process import ConnectError, Graph, run
+from damadics_connect.settings import check, read_config
+
+EXAMPLES = """examples:
+  ros2 run damadics_connect opcua --browse opc.tcp://plc:4840 > plant.yaml
+  ros2 run damadics_connect opcua plant.yaml"""
+LIBRARIES = ('asyncua', 'asyncio')
+MISSING = 'asyncua is not installed: pip install asyncua==2.1.0 (or make env)'
+
+
+def parser() -> argparse.ArgumentParser:
+    """
+    Describe the command line.
+
+    :return: its parser.
+    """
+    p = command_parser(
+        'opcua',
+        'Take signals from an OPC UA server, and serve judgements to OPC UA clients.',
+        EXAMPLES,
+    )
+    p.add_argument('config', nargs='?', type=Path, metavar='CONFIG.yaml', help='what to connect')
+    p.add_argument(
+        '--browse',
+        metavar='URL',
+        help='list the nodes of a server and propose a configuration; with CONFIG.yaml its '
+        'user and security are used',
+    )
+    return p
+
+
+async def connect(path: Path, ros_args: list[str]) -> int:
+    """
+    Connect what a configuration names.
+
+    :param path: the configuration.
+    :param ros_args: arguments of ROS 2.
+    :return: exit code.
+    """
+    from damadics_fd.ros.diagnostics import Diagnostics
+
+    from damadics_connect.opcua.session import read_endpoint
+    from damadics_connect.opcua.source import Options, Source
+    from damadics_connect.opcua.wire import keep_bytes
+    from damadics_connect.publishing import output_of
+    from damadics_connect.valve_list import read_valves
+
+    config = read_config(path)
+    endpoint = read_endpoint(config) if 'server' in config or 'serve' not in config else None
+    valves = read_valves(config, 'node')
+    options = Options(
+        config.number('publishing_interval', 0.0, 0.005, 60.0),
+        int(config.number('queue', 0, 1, 100_000)),
+        config.flag('poll'),
+    )
+    publish = config.text('publish', 'topics', choices=('topics', 'blocks'))
+    if endpoint is not None and not valves:
+        config.problems.append('valves: name at least one; opcua --browse URL proposes some')
+    check(config, path)
+    graph = Graph('opcua', ros_args)
+    jobs = []
+    try:
+        if endpoint is not None:
+            keep_bytes()
+            output = output_of(publish, graph.node, [valve.known_as for valve in valves])
+            source = Source(endpoint, valves, options, output, graph.node.get_logger().info)
+            Diagnostics(graph.node, 'OPC UA', source.report)
+            jobs.append(source.run())
+        graph.start()
+        await asyncio.gather(*jobs)
+    finally:
+        graph.stop()
+    return 0
+
+
+async def browse(url: str, path: Path | None) -> int:
+    """
+    List a server's nodes and propose a configuration.
+
+    :param url: of the server.
+    :param path: a configuration with user and security; None for neither.
+    :return: exit code.
+    """
+    from damadics_connect.opcua.browse import propose
+    from damadics_connect.opcua.session import (
+        Endpoint,
+        SessionError,
+        close_session,
+        open_session,
+        read_endpoint,
+    )
+
+    endpoint = Endpoint(url)
+    if path is not None:
+        endpoint = read_endpoint(read_config(path))._replace(url=url)
+    try:
+        client = await open_session(endpoint)
+        try:
+            print(await propose(client, url))
+        finally:
+            await close_session(client)
+    except SessionError as problem:
+        raise ConnectError(str(problem)) from None
+    return 0
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """
+    Run the command.
+
+    :param args: command line, `sys.argv` by default.
+    :return: exit code.
+    """
+    words, ros_args = split_ros_args(args)
+    p = parser()
+    options = p.parse_args(words)
+    if not options.config and not options.browse:
+        p.error('give a CONFIG.yaml, or --browse URL to have one proposed')
+
+    async def work() -> int:
+        try:
+            if options.browse:
+                return await browse(options.browse, options.config)
+            return await connect(options.config, ros_args)
+        except ModuleNotFoundError as problem:
+            if (problem.name or '').partition('.')[0] != 'asyncua':
+                raise
+            raise ConnectError(MISSING) from None
+
+    return run('opcua', work, LIBRARIES)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

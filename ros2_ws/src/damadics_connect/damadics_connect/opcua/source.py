@@ -1,0 +1,360 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Signals in: follow the nodes of every valve on an OPC UA server."""
+
+import asyncio
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import NamedTuple
+
+from asyncua import Client, ua
+from damadics_fd.ros.diagnostics import Report
+
+from damadics_connect.health import report, some
+from damadics_connect.joining import NANO, Joiner
+from damadics_connect.opcua.session import (
+    Endpoint,
+    SessionError,
+    close_session,
+    open_session,
+    why,
+)
+from damadics_connect.opcua.wire import UNIX, Changes, WireError, read_changes
+from damadics_connect.publishing import Output
+from damadics_connect.settings import shown
+from damadics_fd.core.sample import SIGNALS
+from damadics_connect.valve_list import ValveSource
+
+SHORTEST_INTERVAL, LONGEST_INTERVAL = 0.02, 0.5  # s between two messages of the server
+KEEP_ALIVE = 0.5  # s between two words of a server that has nothing new
+QUIET = 1.2  # s without a word after which the session counts as lost
+PAUSES = (0.2, 0.5, 1.0, 2.0, 5.0)  # s before it is tried again
+AT_ONCE = 1000  # monitored items of one request
+CANNOT_SUBSCRIBE = (ua.uaerrors.BadServiceUnsupported, ua.uaerrors.BadNotImplemented)
+QUALITY = 0xC0000000  # the two bits of a status code that say good, uncertain or bad
+UNCERTAIN, BAD = 0x40000000, 0x80000000
+OVERFLOW = 0x480  # of a data value: the server's queue was too short
+Log = Callable[[str], None]
+
+
+class Options(NamedTuple):
+    """How the server is asked."""
+
+    interval: float = 0.0  # s between two messages of the server; 0: half the valve's period
+    queue: int = 0  # values kept for one message; 0: as many as fit into it, twice
+    poll: bool = False  # read instead of subscribing
+
+
+class Item(NamedTuple):
+    """One signal of one valve, as a monitored item of the server."""
+
+    valve: str
+    slot: int
+    scale: Callable[[float], float]
+    joiner: Joiner
+
+
+class Feed:
+    """
+    The valves with one period: one subscription.
+
+    :param period: [s].
+    :param valves: with the numbers that the output knows them by.
+    :param options: how the server is asked.
+    :param output: takes the samples.
+    """
+
+    def __init__(
+        self, period: float, valves: dict[int, ValveSource], options: Options, output: Output
+    ) -> None:
+        self.period = period
+        half = min(max(period / 2.0, SHORTEST_INTERVAL), LONGEST_INTERVAL)
+        self.interval = options.interval or half
+        self.queue = options.queue or max(2, 2 * round(self.interval / period) + 2)
+        self.items: list[Item] = []
+        self.nodes: list[str] = []
+        self.joiners: dict[str, Joiner] = {}
+        settle = int((1.5 * self.interval + 0.05) * NANO)
+        for number, valve in valves.items():
+            joiner = Joiner(
+                int(period * NANO),
+                settle,
+                tuple(signal.slot for signal in valve.signals),
+                partial(output.send, number),
+            )
+            self.joiners[valve.name] = joiner
+            for signal in valve.signals:
+                self.items.append(Item(valve.name, signal.slot, signal.scale, joiner))
+                self.nodes.append(signal.source)
+
+
+class Source:
+    """
+    A server and the valves on it.
+
+    :param endpoint: the server.
+    :param valves: in the order of the output's numbers.
+    :param options: how the server is asked.
+    :param output: takes the samples.
+    :param log: takes what a person should know.
+    """
+
+    def __init__(
+        self,
+        endpoint: Endpoint,
+        valves: Sequence[ValveSource],
+        options: Options,
+        output: Output,
+        log: Log,
+    ) -> None:
+        self._endpoint = endpoint
+        self._poll = options.poll
+        self._output = output
+        self._log = log
+        by_period: dict[float, dict[int, ValveSource]] = {}
+        for number, valve in enumerate(valves):
+            by_period.setdefault(valve.period, {})[number] = valve
+        self._feeds = [
+            Feed(period, group, options, output) for period, group in by_period.items()
+        ]
+        self._joiners = {n: joiner for feed in self._feeds for n, joiner in feed.joiners.items()}
+        self._heard = 0.0  # monotonic time of the server's last word
+        self._fault = 'not connected yet'
+        self._unknown: dict[str, str] = {}
+        self._sessions = self._values = self._lost = self._garbled = 0
+
+    async def run(self) -> None:
+        """Follow the server for ever; connect again whenever it was lost."""
+        failures = 0
+        while True:
+            try:
+                client = await open_session(self._endpoint)
+                try:
+                    self._sessions += 1
+                    failures = 0
+                    await self._follow(client)
+                finally:
+                    await close_session(client)
+            except SessionError as problem:
+                reason = str(problem)
+            except (ua.UaError, OSError, TimeoutError) as problem:
+                reason = f'{shown(self._endpoint.url)}: {why(problem)}'
+            if reason != self._fault:
+                self._log(f'not connected: {reason}')
+            self._fault = reason
+            await asyncio.sleep(PAUSES[min(failures, len(PAUSES) - 1)])
+            failures += 1
+
+    def report(self) -> Report:
+        """Say how the server and the valves are."""
+        values = {
+            'Server': shown(self._endpoint.url),
+            'Connected': not self._fault,
+            'Sessions': self._sessions,
+            'Values': self._values,
+            'Values lost by the server': self._lost,
+            'Unreadable messages': self._garbled,
+        }
+        unknown = [f'{node} ({cause})' for node, cause in self._unknown.items()]
+        problems = [f'no such node: {some(unknown)}'] if unknown else []
+        return report(self._fault, self._joiners, self._output, values, problems)
+
+    async def _follow(self, client: Client) -> None:
+        """Subscribe to everything, then look after it until the server falls silent."""
+        self._heard = time.monotonic()
+        self._unknown.clear()
+        spaces = await client.get_namespace_array()
+        polled = []
+        for feed in self._feeds:
+            now = time.monotonic_ns()
+            for joiner in feed.joiners.values():
+                joiner.begin(now)
+            if self._poll or not await self._subscribe(client, feed, spaces):
+                polled.append(asyncio.create_task(self._read_on(client, feed, spaces)))
+        self._fault = ''
+        self._log(f'connected to {shown(self._endpoint.url)}: {len(self._joiners)} valve(s)')
+        if self._unknown:
+            self._log(f'no such node: {some([f"{n} ({c})" for n, c in self._unknown.items()])}')
+        tick = min(max(min(feed.interval for feed in self._feeds) / 2.0, 0.01), 0.1)
+        try:
+            while True:
+                await asyncio.sleep(tick)
+                silent = time.monotonic() - self._heard
+                if silent > QUIET + max(feed.interval for feed in self._feeds):
+                    raise SessionError(
+                        f'{shown(self._endpoint.url)}: silent for {silent:.1f} s: server or '
+                        'network is gone'
+                    )
+                for task in polled:
+                    if task.done():
+                        task.result()
+                now = time.monotonic_ns()
+                for joiner in self._joiners.values():
+                    joiner.look(now)
+                self._output.flush()
+        finally:
+            for task in polled:
+                task.cancel()
+
+    async def _subscribe(self, client: Client, feed: Feed, spaces: list[str]) -> bool:
+        """Make the subscription of a feed; False where the server has none."""
+        parameters = ua.CreateSubscriptionParameters(
+            RequestedPublishingInterval=1000.0 * feed.interval,
+            RequestedMaxKeepAliveCount=max(1, round(KEEP_ALIVE / feed.interval)),
+            RequestedLifetimeCount=max(30, round(30.0 / feed.interval)),
+            MaxNotificationsPerPublish=0,
+            PublishingEnabled=True,
+        )
+        session = client.uaclient.session
+        try:
+            created = await session.create_subscription(parameters, partial(self._take, feed))
+        except CANNOT_SUBSCRIBE:
+            self._log('the server has no subscriptions: its values are read')
+            return False
+        requests = []
+        for handle, (item, node) in enumerate(zip(feed.items, feed.nodes, strict=True)):
+            nodeid = node_of(node, spaces)
+            if nodeid is None:
+                self._without(item, node, 'not a node id such as ns=2;s=NAME')
+                continue
+            requests.append(
+                ua.MonitoredItemCreateRequest(
+                    ItemToMonitor=ua.ReadValueId(NodeId=nodeid, AttributeId=ua.AttributeIds.Value),
+                    MonitoringMode=ua.MonitoringMode.Reporting,
+                    RequestedParameters=ua.MonitoringParameters(
+                        ClientHandle=handle,
+                        SamplingInterval=1000.0 * min(feed.period / 2.0, feed.interval),
+                        QueueSize=feed.queue,
+                        DiscardOldest=True,
+                    ),
+                )
+            )
+        for begin in range(0, len(requests), AT_ONCE):
+            some_of = requests[begin : begin + AT_ONCE]
+            results = await session.create_monitored_items(
+                ua.CreateMonitoredItemsParameters(
+                    SubscriptionId=created.SubscriptionId,
+                    TimestampsToReturn=ua.TimestampsToReturn.Both,
+                    ItemsToCreate=some_of,
+                )
+            )
+            for request, result in zip(some_of, results, strict=True):
+                if result.StatusCode.value & BAD:
+                    handle = request.RequestedParameters.ClientHandle
+                    self._without(feed.items[handle], feed.nodes[handle], result.StatusCode.name)
+        return True
+
+    def _without(self, item: Item, node: str, cause: str) -> None:
+        item.joiner.without(item.slot)
+        item.joiner.tally.bad[SIGNALS[item.slot]] = cause
+        self._unknown[node[:60]] = cause
+
+    async def _take(self, feed: Feed, result: ua.PublishResult) -> None:
+        """Take one message of a subscription."""
+        self._heard = time.monotonic()
+        for notification in result.NotificationMessage.NotificationData or ():
+            if isinstance(notification, ua.ExtensionObject):
+                try:
+                    changes = read_changes(notification.Body)
+                except WireError:
+                    self._garbled += 1
+                    continue
+                self._take_changes(feed, changes, result.NotificationMessage.PublishTime)
+            elif isinstance(notification, ua.StatusChangeNotification):
+                self._heard = 0.0  # the server has ended the subscription: begin again
+
+    def _take_changes(self, feed: Feed, changes: Changes, server: object) -> None:
+        now = time.monotonic_ns()
+        wall = _ticks(server) or time.time_ns()
+        for joiner in feed.joiners.values():
+            joiner.source_clock(wall, now)
+        self._values += len(changes.handle)
+        order: Sequence[int] = range(len(changes.stamp))
+        if any(a > b for a, b in zip(changes.stamp, changes.stamp[1:], strict=False)):
+            order = sorted(order, key=changes.stamp.__getitem__)
+        items = feed.items
+        for n in order:
+            item = items[changes.handle[n]]
+            status, value = changes.status[n], changes.value[n]
+            if status or changes.kind[n]:
+                value = self._judge(item, status, value, changes.kind[n])
+            elif item.joiner.tally.bad:
+                item.joiner.tally.bad.pop(SIGNALS[item.slot], None)
+            item.joiner.take(item.slot, changes.stamp[n] or wall, item.scale(value), now)
+        for joiner in feed.joiners.values():
+            joiner.look(now)
+        self._output.flush()
+
+    def _judge(self, item: Item, status: int, value: float, kind: str) -> float:
+        """Return a value by its quality: NaN for a bad one or for what is no number."""
+        tally, name = item.joiner.tally, SIGNALS[item.slot]
+        self._lost += status & OVERFLOW == OVERFLOW
+        quality = status & QUALITY
+        if quality == UNCERTAIN:
+            tally.uncertain[name] = tally.uncertain.get(name, 0) + 1
+        if quality not in (0, UNCERTAIN):
+            tally.bad[name] = ua.StatusCode(status).name
+            return float('nan')
+        if kind:
+            tally.bad[name] = f'{kind} where a number is expected'
+            return float('nan')
+        tally.bad.pop(name, None)
+        return value
+
+    async def _read_on(self, client: Client, feed: Feed, spaces: list[str]) -> None:
+        """Read the values of a feed once a period, for servers without subscriptions."""
+        ids = [node_of(node, spaces) or ua.NodeId() for node in feed.nodes]
+        request = ua.ReadParameters(
+            TimestampsToReturn=ua.TimestampsToReturn.Both,
+            NodesToRead=[ua.ReadValueId(NodeId=i, AttributeId=ua.AttributeIds.Value) for i in ids],
+        )
+        due = time.monotonic()
+        while True:
+            results = await client.uaclient.session.read(request)
+            self._heard = time.monotonic()
+            changes = Changes([], [], [], [], [])
+            for handle, result in enumerate(results):
+                value = result.Value.Value if result.Value is not None else None
+                number = isinstance(value, int | float)
+                stamp = _ticks(result.SourceTimestamp) or _ticks(result.ServerTimestamp)
+                row = (
+                    handle,
+                    float(value) if number else float('nan'),
+                    result.StatusCode.value if result.StatusCode else 0,
+                    stamp,
+                    '' if number else type(value).__name__,
+                )
+                for column, cell in zip(changes, row, strict=True):
+                    column.append(cell)
+            self._take_changes(feed, changes, None)
+            due = max(due + feed.period, time.monotonic() - feed.period)
+            await asyncio.sleep(max(0.0, due - time.monotonic()))
+
+
+def node_of(text: str, spaces: Sequence[str]) -> ua.NodeId | None:
+    """
+    Read a node id.
+
+    :param text: as `ns=2;s=LV101.PV`, `i=2258` or `nsu=URI;s=LV101.PV`.
+    :param spaces: URIs of the server's namespaces.
+    :return: the node id; None where the text is none or the namespace is unknown.
+    """
+    if text.startswith('nsu='):
+        uri, _, rest = text.removeprefix('nsu=').rpartition(';')
+        if uri not in spaces:
+            return None
+        text = f'ns={spaces.index(uri)};{rest}'
+    try:
+        return ua.NodeId.from_string(text)
+    except (ua.UaError, ValueError):
+        return None
+
+
+def _ticks(when: object) -> int:
+    """Return a time of asyncua as ns since 1970; 0 for none."""
+    if when is None:
+        return 0
+    return max(0, (ua.datetime_to_win_epoch(when) - UNIX) * 100)  # type: ignore[arg-type]
+
+

@@ -1,0 +1,73 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Servers of the tests: each in its own process, on a port of its own."""
+
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+HERE = Path(__file__).parent
+
+
+def free_port() -> int:
+    """Find a port that nobody uses."""
+    with socket.socket() as probe:
+        probe.bind(('127.0.0.1', 0))
+        return probe.getsockname()[1]
+
+
+def wait_for(condition, patience: float = 20.0, pause: float = 0.05) -> bool:
+    """Wait until something has come true."""
+    end = time.monotonic() + patience
+    while not condition() and time.monotonic() < end:
+        time.sleep(pause)
+    return bool(condition())
+
+
+def listens(port: int) -> bool:
+    """Tell whether somebody listens."""
+    with socket.socket() as probe:
+        probe.settimeout(1.0)
+        return probe.connect_ex(('127.0.0.1', port)) == 0
+
+
+class Server:
+    """A server as a process that can be killed, held and started again."""
+
+    def __init__(self, folder: Path, script: str, *arguments: object) -> None:
+        self.port = free_port()
+        self._log = folder / f'{Path(script).stem}_{self.port}.log'
+        words = [str(self.port), *map(str, arguments)]
+        program = shutil.which(script)
+        self._command = [program, *words] if program else [sys.executable, str(HERE / script), *words]
+        self._process: subprocess.Popen | None = None
+        self.start()
+
+    def start(self) -> None:
+        with self._log.open('ab') as log:
+            self._process = subprocess.Popen(
+                self._command, stdin=subprocess.PIPE, stdout=log, stderr=subprocess.STDOUT
+            )
+        if not wait_for(lambda: listens(self.port) or self._process.poll() is not None):
+            pytest.fail(f'{self._command} does not listen')
+        assert self._process.poll() is None, self._log.read_text(errors='replace')[-2000:]
+
+    def tell(self, line: str) -> None:
+        self._process.stdin.write(line.encode() + b'\n')
+        self._process.stdin.flush()
+
+    def signal(self, number: int) -> None:
+        os.kill(self._process.pid, number)
+
+    def kill(self) -> None:
+        if self._process.poll() is None:
+            self.signal(signal.SIGCONT)
+            self._process.kill()
+        self._process.wait()
