@@ -15,9 +15,8 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from asyncua import Server, ua
-from asyncua.crypto.permission_rules import SimpleRoleRuleset
+from asyncua.crypto.permission_rules import SimpleRoleRuleset, User, UserRole
 from asyncua.server.user_managers import UserManager
-from asyncua.crypto.permission_rules import User, UserRole
 
 SIGNALS = ('CV', 'PV', 'P1', 'P2', 'T1', 'FLOW', 'PS')
 START = (0.5, 0.5, 35.0, 26.0, 20.0, 5.0, 1.0)

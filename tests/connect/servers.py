@@ -46,7 +46,9 @@ class Server:
         self._log = folder / f'{Path(script).stem}_{self.port}.log'
         words = [str(self.port), *map(str, arguments)]
         program = shutil.which(script)
-        self._command = [program, *words] if program else [sys.executable, str(HERE / script), *words]
+        self._command = (
+            [program, *words] if program else [sys.executable, str(HERE / script), *words]
+        )
         self._process: subprocess.Popen | None = None
         self.start()
 

@@ -10,8 +10,8 @@ import time
 import numpy as np
 import pytest
 import yaml
-from connect.servers import Server
 from conftest import Peer
+from connect.servers import Server
 from damadics_bringup.processes import executable
 from damadics_fd.ros import qos
 from damadics_msgs.msg import FleetLayout, Measurement, MeasurementBlock
@@ -101,7 +101,9 @@ def stamps(messages) -> np.ndarray:
 
 def test_samples_have_source_time_quality_and_units_and_hold_what_does_not_change(connect, serve):
     server = serve(2)
-    c = connect({'server': url(server), 'period': 0.5, 'valves': {'lv0': valve(0), 'lv1': valve(1)}})
+    c = connect(
+        {'server': url(server), 'period': 0.5, 'valves': {'lv0': valve(0), 'lv1': valve(1)}}
+    )
     assert c.wait(lambda: len(c.samples['lv0']) > 4), c.log()
     held = c.samples['lv0'][-1]
     assert held.p1 == pytest.approx(3.5e6) and held.ps == pytest.approx(1e5)
@@ -169,7 +171,10 @@ def test_many_valves_in_blocks_every_change_with_its_time(connect, serve):
         assert len(mine) > 3
         assert (np.diff(mine) == period).all(), 'no change is lost, no time is rounded'
         assert (mine % period == 0).all()
-    assert 'lost by the server' in str(c.values().keys()) and c.values()['Values lost by the server'] == '0'
+    assert (
+        'lost by the server' in str(c.values().keys())
+        and c.values()['Values lost by the server'] == '0'
+    )
 
 
 def test_what_is_wrong_is_told_in_one_line_and_the_others_go_on(connect, serve):

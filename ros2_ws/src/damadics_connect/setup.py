@@ -1,12 +1,14 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
+from xml.etree import ElementTree
+
 from setuptools import find_packages, setup
 
 package = 'damadics_connect'
 
 setup(
     name=package,
-    version='0.1.0',
+    version=ElementTree.parse('package.xml').findtext('version'),
     packages=find_packages(exclude=['test']),
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/' + package]),

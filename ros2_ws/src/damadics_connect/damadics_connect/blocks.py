@@ -45,7 +45,9 @@ class Blocks:
         layout.version = self._version = zlib.crc32(lists.encode())
         self._layout = node.create_publisher(FleetLayout, '/fleet/layout', qos.latched(1))
         self._layout.publish(layout)
-        self._publisher = node.create_publisher(MeasurementBlock, '/measurement_block', qos.SAMPLES)
+        self._publisher = node.create_publisher(
+            MeasurementBlock, '/measurement_block', qos.SAMPLES
+        )
 
     def send(self, valve: int, stamp: int, values: list[float]) -> None:
         """Take a sample into the block."""

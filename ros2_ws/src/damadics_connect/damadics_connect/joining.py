@@ -86,7 +86,7 @@ class Joiner:
 
     def begin(self, now: int) -> None:
         """
-        A session has begun: wait for the present values of all signals.
+        Begin a session: wait for the present values of all signals.
 
         :param now: [ns].
         """

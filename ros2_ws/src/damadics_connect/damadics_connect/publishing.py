@@ -5,11 +5,10 @@
 from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
+from damadics_fd.core.sample import SIGNALS
 from damadics_fd.ros import qos
 from damadics_msgs.msg import Measurement
 from rclpy.node import Node
-
-from damadics_fd.core.sample import SIGNALS
 
 NANO = 1_000_000_000
 P1, P2, PS = (SIGNALS.index(name) for name in ('p1', 'p2', 'ps'))

@@ -5,9 +5,10 @@
 import re
 from typing import NamedTuple
 
+from damadics_fd.core.sample import SIGNALS
+
 from damadics_connect.publishing import ValveName
 from damadics_connect.settings import Section
-from damadics_fd.core.sample import SIGNALS
 from damadics_connect.units import Scale, read_scale
 
 NAME = re.compile(r'[a-z][a-z0-9_]*(/[a-z][a-z0-9_]*)*')
@@ -51,7 +52,8 @@ def read_valves(config: Section, what: str, *, with_topic: bool = False) -> list
     for name, entry in config.sections('valves').items():
         if not NAME.fullmatch(name):
             config.problems.append(
-                f'valves.{name[:40]}: a name consists of small letters, digits and _, such as lv101'
+                f'valves.{name[:40]}: a name consists of small letters, digits and _, '
+                'such as lv101'
             )
         signals = []
         for signal, given in _signals(entry, what).items():

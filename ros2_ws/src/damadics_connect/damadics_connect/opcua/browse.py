@@ -102,7 +102,9 @@ async def variables_of(client: Client) -> list[Variable]:
             results = await client.browse_nodes([node for node, _ in some_of])
             for (_, path), (_, result) in zip(some_of, results, strict=True):
                 for reference in result.References or ():
-                    nodeid = ua.NodeId(reference.NodeId.Identifier, reference.NodeId.NamespaceIndex)
+                    nodeid = ua.NodeId(
+                        reference.NodeId.Identifier, reference.NodeId.NamespaceIndex
+                    )
                     if nodeid in seen or not nodeid.NamespaceIndex or len(seen) > MOST:
                         continue
                     seen.add(nodeid)
@@ -132,7 +134,7 @@ async def propose(client: Client, url: str) -> str:
         '# directions: cv and x1 are fractions with 1 = closed; {unit: "%", invert: true} makes',
         '# them so where 100 % means open.',
         f'server: {url}',
-        'period: 1.0        # s, of the valve\'s samples',
+        "period: 1.0        # s, of the valve's samples",
         'valves:' if proposals else 'valves: {}',
     ]
     for proposal in proposals:

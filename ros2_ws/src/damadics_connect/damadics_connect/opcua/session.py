@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 from asyncua import Client, ua
 from asyncua.crypto import security_policies
-from asyncua.ua import uaerrors
 
 from damadics_connect.settings import Secret, Section, shown
 
@@ -41,7 +40,7 @@ class Security(NamedTuple):
     mode: str = ''
     certificate: Path = Path()
     key: Path = Path()
-    key_password: Secret = Secret()  # noqa: RUF012 - immutable
+    key_password: Secret = Secret()
     server_certificate: Path = Path()
 
 
@@ -108,7 +107,7 @@ def why(problem: BaseException) -> str:
         return 'nobody listens there: is the server running?'
     if isinstance(problem, ua.UaStatusCodeError):
         name = type(problem).__name__
-        return f'{name}: {REMEDIES.get(name, uaerrors.get_doc(problem.code) if hasattr(uaerrors, "get_doc") else "see the log of the server")}'
+        return f'{name}: {REMEDIES.get(name, "the log of the server may say more")}'
     if isinstance(problem, OSError):
         return problem.strerror or type(problem).__name__
     return f'{type(problem).__name__}: the server broke the session off'

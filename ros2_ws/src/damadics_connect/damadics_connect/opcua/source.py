@@ -9,6 +9,7 @@ from functools import partial
 from typing import NamedTuple
 
 from asyncua import Client, ua
+from damadics_fd.core.sample import SIGNALS
 from damadics_fd.ros.diagnostics import Report
 
 from damadics_connect.health import report, some
@@ -23,7 +24,6 @@ from damadics_connect.opcua.session import (
 from damadics_connect.opcua.wire import UNIX, Changes, WireError, read_changes
 from damadics_connect.publishing import Output
 from damadics_connect.settings import shown
-from damadics_fd.core.sample import SIGNALS
 from damadics_connect.valve_list import ValveSource
 
 SHORTEST_INTERVAL, LONGEST_INTERVAL = 0.02, 0.5  # s between two messages of the server
@@ -115,9 +115,7 @@ class Source:
         by_period: dict[float, dict[int, ValveSource]] = {}
         for number, valve in enumerate(valves):
             by_period.setdefault(valve.period, {})[number] = valve
-        self._feeds = [
-            Feed(period, group, options, output) for period, group in by_period.items()
-        ]
+        self._feeds = [Feed(period, group, options, output) for period, group in by_period.items()]
         self._joiners = {n: joiner for feed in self._feeds for n, joiner in feed.joiners.items()}
         self._heard = 0.0  # monotonic time of the server's last word
         self._fault = 'not connected yet'
@@ -356,5 +354,3 @@ def _ticks(when: object) -> int:
     if when is None:
         return 0
     return max(0, (ua.datetime_to_win_epoch(when) - UNIX) * 100)  # type: ignore[arg-type]
-
-

@@ -101,20 +101,21 @@ def _alike(body: bytes, count: int) -> Changes | None:
     names = layout.names or ()
     status = rows['status'].tolist() if 'status' in names else [0] * count
     if 'source' in names:
-        stamp = _nanoseconds(rows['source'], rows['pico'] if 'pico' in names else None)
+        stamp = _nanoseconds(rows, 'source', 'pico')
     elif 'server' in names:
-        stamp = _nanoseconds(rows['server'], rows['server_pico'] if 'server_pico' in names else None)
+        stamp = _nanoseconds(rows, 'server', 'server_pico')
     else:
         stamp = [0] * count
     values = rows['value'].astype(np.float64).tolist()
     return Changes(rows['handle'].tolist(), values, status, stamp, [''] * count)
 
 
-def _nanoseconds(ticks: NDArray[np.int64], pico: NDArray[np.uint16] | None) -> list[int]:
+def _nanoseconds(rows: NDArray[np.void], ticks_of: str, fine_of: str) -> list[int]:
+    ticks = rows[ticks_of]
     ns = (ticks - UNIX) * 100
-    if pico is not None:
-        ns = ns + pico // 100  # in units of 10 ps
-    return np.where((ticks > UNIX) & (ticks < 2 * UNIX // 1), ns, 0).tolist()
+    if fine_of in (rows.dtype.names or ()):
+        ns = ns + rows[fine_of] // 100  # in units of 10 ps
+    return np.where((ticks > UNIX) & (ticks < 2 * UNIX), ns, 0).tolist()
 
 
 def _one_by_one(body: bytes, count: int) -> Changes:
