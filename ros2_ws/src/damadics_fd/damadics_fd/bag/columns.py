@@ -9,7 +9,8 @@ Read a topic of a bag as columns, by whole chunks instead of message by message.
 ['cv', 'log_time', 'stamp', 'x1']
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,12 +18,14 @@ from numpy.typing import NDArray
 
 from damadics_fd.bag.cdr import kernels
 from damadics_fd.bag.cdr.decoder import Columns, Decoder, join
-from damadics_fd.bag.errors import BagError
+from damadics_fd.bag.errors import BagError, printable
 from damadics_fd.bag.limits import Limits
-from damadics_fd.bag.mcap.reader import McapFile
-from damadics_fd.bag.sources import bag_files
+from damadics_fd.bag.messages import MessageFile
+from damadics_fd.bag.opening import open_file
+from damadics_fd.bag.sources import bag_files, missing_files
 
 kernels.warm_up()  # here rather than with the first file
+SHOWN = 20  # topics named in a message
 MOST_PER_BYTE = 2  # messages that a file may announce before memory is taken for them
 
 
@@ -69,16 +72,16 @@ def _read_whole(
     files = bag_files(path)
     if len(files) != 1:
         return None
-    with McapFile(files[0], limits=limits) as mcap:
-        name = '/' + topic.lstrip('/')
-        numbers = [channel.id for channel in mcap.channels.values() if channel.topic == name]
-        total = mcap.summary.counts.get(numbers[0], 0) if len(numbers) == 1 else 0
-        if not 0 < total < MOST_PER_BYTE * files[0].stat().st_size:
-            return None
-        try:
-            return Decoder(mcap, numbers[0], fields).decode_all(total)
-        except BagError:
-            return None
+    try:
+        with open_file(files[0], limits=limits) as file:
+            name = resolved(topic, file)
+            numbers = [channel.id for channel in file.channels.values() if channel.topic == name]
+            total = file.stated.get(numbers[0], 0) if len(numbers) == 1 else 0
+            if not 0 < total < MOST_PER_BYTE * files[0].stat().st_size:
+                return None
+            return Decoder(file, numbers[0], fields).decode_all(total)
+    except BagError:
+        return None
 
 
 def iter_columns(
@@ -97,85 +100,107 @@ def iter_columns(
     :return: the columns of each chunk, at least once.
     :raises BagError: as `read_columns`.
     """
-    topic = '/' + topic.lstrip('/')
     seen: set[str] = set()
     empty: Columns | None = None
     delivered = False
-    for mcap in open_files(path, on_problem, limits):
+    for file in open_files(path, on_problem, limits):
         decoders: dict[int, Decoder] = {}
-        for at, data in mcap.chunks():
-            for columns in _decoded(mcap, at, data, topic, fields, decoders):
+        counts: Counter[int] = Counter()
+        for at, data in file.chunks():
+            for number, columns in _decoded(file, at, data, topic, fields, decoders):
                 delivered = True
+                counts[number] += len(columns['log_time'])
                 yield columns
-        seen |= {channel.topic for channel in mcap.channels.values()}
+        seen |= {channel.topic for channel in file.channels.values()}
+        name = resolved(topic, file)
+        numbers = [channel.id for channel in file.channels.values() if channel.topic == name]
+        file.topic_counts({number: counts[number] for number in numbers}, one_text=True)
         if on_problem:
-            for problem in mcap.problems:
-                on_problem(f'{mcap.path}: {problem.text} (at byte {problem.offset})')
-        for channel in mcap.channels.values():
-            if channel.topic == topic:
-                empty = Decoder(mcap, channel.id, fields).empty()
+            for text in file.told():
+                on_problem(text)
+        for number in numbers:
+            empty = Decoder(file, number, fields).empty()
     if not delivered:
         if empty is None:
-            raise BagError(
-                f'has no topic {topic}; it has {", ".join(sorted(seen)) or "none"}', path
-            )
+            raise BagError(f'has no topic {topic}; it has {listing(seen)}', path)
         yield empty
+
+
+def resolved(topic: str, file: MessageFile) -> str:
+    """Return a topic as the file has it: exactly as given, or with a slash in front."""
+    names = {channel.topic for channel in file.channels.values()}
+    return topic if topic in names else '/' + topic.lstrip('/')
+
+
+def listing(names: Iterable[str]) -> str:
+    """Name topics for a person, the first few of many."""
+    names = sorted(names)
+    more = f' and {len(names) - SHOWN} more' if len(names) > SHOWN else ''
+    return printable(', '.join(names[:SHOWN])) + more if names else 'none'
 
 
 def open_files(
     path: str | Path,
     on_problem: Callable[[str], None] | None,
     limits: Limits = Limits(),
-) -> Iterator[McapFile]:
+) -> Iterator[MessageFile]:
     """
     Open the files of a bag one after the other.
 
-    :param path: MCAP file or bag directory.
+    :param path: file or bag directory.
     :param on_problem: told which of several files is none, as a crash or a full disk may leave
         one; None makes it an error, and damage within the files, too.
     :param limits: what the files may ask for.
     :raises BagError: where the bag cannot be opened.
     """
     files = bag_files(path)
-    for file in files:
+    for text in missing_files(path):
+        if on_problem is None:
+            raise BagError(text, path)
+        on_problem(f'{path}: {text}')
+    for name in files:
         try:
-            mcap = McapFile(file, on_problem is not None, limits)
+            file = open_file(name, on_problem is not None, limits)
         except BagError as error:
             if on_problem is None or len(files) == 1:
                 raise
             on_problem(str(error))
             continue
-        with mcap:
-            yield mcap
+        with file:
+            yield file
 
 
 def _decoded(
-    mcap: McapFile,
+    file: MessageFile,
     at: int,
     data: NDArray[np.uint8],
     topic: str,
     fields: Sequence[str] | None,
     decoders: dict[int, Decoder],
-) -> Iterator[Columns]:
+) -> Iterator[tuple[int, Columns]]:
     """Decode the messages of a topic in a chunk; `decoders` gets those of its channels."""
-    _note_channels(mcap, topic, fields, decoders)
+    _note_channels(file, topic, fields, decoders)
     if len(decoders) == 1:
-        columns = next(iter(decoders.values())).decode_alike(data)
+        number, decoder = next(iter(decoders.items()))
+        columns = decoder.decode_alike(data)
         if columns:
             if len(columns['log_time']):
-                yield columns
+                yield number, columns
             return
-    batch = mcap.index(data, at)
-    _note_channels(mcap, topic, fields, decoders)
+    batch = file.index(data, at)
+    _note_channels(file, topic, fields, decoders)
     for number, decoder in decoders.items():
         rows = batch.channels == number
         if rows.any():
-            yield decoder.decode(batch, batch.starts[rows], batch.sizes[rows])
+            yield number, decoder.decode(batch, batch.starts[rows], batch.sizes[rows])
 
 
 def _note_channels(
-    mcap: McapFile, topic: str, fields: Sequence[str] | None, decoders: dict[int, Decoder]
+    file: MessageFile, topic: str, fields: Sequence[str] | None, decoders: dict[int, Decoder]
 ) -> None:
-    for channel in mcap.channels.values():
-        if channel.topic == topic and channel.id not in decoders:
-            decoders[channel.id] = Decoder(mcap, channel.id, fields)
+    if len(file.channels) == len(decoders):
+        return
+    name = resolved(topic, file)
+    for channel in file.channels.values():
+        if channel.topic == name and channel.id not in decoders:
+            decoders[channel.id] = Decoder(file, channel.id, fields)

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a bag holds, and whether it is whole."""
 
-import struct
 from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,40 +10,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damadics_fd.bag.cdr.decoder import Decoder
-from damadics_fd.bag.errors import BagError
+from damadics_fd.bag.errors import BagError, printable
 from damadics_fd.bag.limits import Limits
-from damadics_fd.bag.mcap.crc import crc32
-from damadics_fd.bag.mcap.reader import Batch, McapFile
-from damadics_fd.bag.mcap.records import HEAD, Op
-from damadics_fd.bag.sources import bag_files
+from damadics_fd.bag.messages import Batch, MessageFile
+from damadics_fd.bag.opening import open_file
+from damadics_fd.bag.rosbag2 import METADATA_FILE, read_metadata
+from damadics_fd.bag.sources import bag_files, missing_files
+from damadics_fd.bag.timing import Timing
 
 WHOLE, UNUSABLE, LOSSY = 0, 1, 3  # exit codes, as those of `mcap recover`
-BLOCK = 1 << 24  # [B] of the file checked at a time
 SEVERAL = ('/tf', '/tf_static', '/diagnostics', '/rosout', '/parameter_events')
+MOST_MISMATCHES = 20  # topics told one by one
 
 
 @dataclass
 class TopicReport:
-    """One topic of a bag; times in ns."""
+    """One topic of a bag."""
 
     name: str
     type: str
-    count: int = 0
-    start: int = 0
-    end: int = 0
-    steps_back: int = 0  # stamps smaller than the one before
-    rolled_over: int = 0  # times that do not fit 63 bits or are negative
-    _last: int = field(default=-(2**63), repr=False)
+    timing: Timing = field(default_factory=Timing)
 
-    def note(self, log_time: NDArray[np.int64], stamp: NDArray[np.int64]) -> None:
-        """Take the next messages."""
-        first, last = int(log_time.min()), int(log_time.max())
-        self.start = min(first, self.start) if self.count else first
-        self.end = max(last, self.end) if self.count else last
-        self.count += len(log_time)
-        self.rolled_over += int(((log_time < 0) | (stamp < 0)).sum())
-        self.steps_back += int((np.diff(stamp) < 0).sum()) + int(stamp[0] < self._last)
-        self._last = int(stamp[-1])
+    @property
+    def count(self) -> int:
+        """Messages that can be read."""
+        return self.timing.count
 
 
 @dataclass
@@ -60,6 +50,7 @@ class Report:
     files: int = 0
     size: int = 0
     topics: dict[str, TopicReport] = field(default_factory=dict)
+    attachments: int = 0
     problems: list[str] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
 
@@ -73,83 +64,112 @@ class Report:
         """Exit code: 0 whole, 3 lossy, 1 unusable."""
         if not self.problems:
             return WHOLE
-        return LOSSY if self.messages else UNUSABLE
+        return LOSSY if self.messages or self.attachments else UNUSABLE
+
+    @property
+    def start(self) -> int:
+        """First log time of all topics [ns]."""
+        return min((t.timing.start for t in self.topics.values() if t.count), default=0)
+
+    @property
+    def end(self) -> int:
+        """Last log time of all topics [ns]."""
+        return max((t.timing.end for t in self.topics.values() if t.count), default=0)
 
 
 def inspect(path: str | Path, limits: Limits = Limits()) -> Report:
     """
     Read a bag to its end and check everything that can be checked.
 
-    CRC of chunks, data section and summary; indexes and counts against the messages; stamps.
+    CRC of chunks, attachments, data section and summary; indexes and counts against the messages
+    and `metadata.yaml`; stamps.
 
-    :param path: MCAP file or bag directory.
-    :param limits: what the file may ask for.
+    :param path: file or bag directory.
+    :param limits: what the files may ask for.
     :return: the report; it never raises for what is in a file.
     """
     report = Report(Path(path))
     try:
         files = bag_files(path)
+        report.problems += missing_files(path)
     except BagError as error:
         report.problems.append(str(error))
         return report
-    for file in files:
+    for name in files:
         report.files += 1
         try:
-            report.size += file.stat().st_size
-            with McapFile(file, tolerant=True, limits=limits) as mcap:
-                _inspect_file(mcap, report)
+            report.size += name.stat().st_size
+            with open_file(name, tolerant=True, limits=limits) as file:
+                _inspect_file(file, report)
         except (BagError, OSError) as error:
-            report.problems.append(str(error))
+            report.problems.append(printable(str(error)))
+    _compare_with_metadata(report)
     for topic in report.topics.values():
-        if topic.rolled_over:
-            report.problems.append(f'{topic.name}: {topic.rolled_over} stamps have rolled over')
-        if topic.steps_back:
-            text = f'{topic.name}: stamps go back {topic.steps_back} times'
-            measured = topic.name.rsplit('/', 1)[-1] == 'measurement'
-            (report.problems if measured else report.remarks).append(text)
+        timing = topic.timing
+        measured = topic.name.rsplit('/', 1)[-1] == 'measurement'
+        told = report.problems if measured else report.remarks
+        if timing.negative:
+            told.append(f'{topic.name}: {timing.negative} stamps have rolled over')
+        if timing.steps_back:
+            told.append(f'{topic.name}: stamps go back {timing.steps_back} times')
     return report
 
 
-def _inspect_file(mcap: McapFile, report: Report) -> None:
+def _compare_with_metadata(report: Report) -> None:
+    stated = read_metadata(report.path) if report.path.is_dir() else None
+    if not stated:
+        return
+    wrong = [
+        f'{name}: {report.topics[name].count if name in report.topics else 0} of {count} messages'
+        f' that {METADATA_FILE} lists are there'
+        for name, count in stated.counts.items()
+        if count != (report.topics[name].count if name in report.topics else 0)
+    ]
+    report.problems += wrong[:MOST_MISMATCHES]
+    if not wrong and stated.messages >= 0 and stated.messages != report.messages:
+        report.problems.append(
+            f'{report.messages} of {stated.messages} messages that {METADATA_FILE} lists are there'
+        )
+
+
+def _inspect_file(file: MessageFile, report: Report) -> None:
     counts: Counter[int] = Counter()
-    offsets = []
     decoders: dict[int, Decoder | None] = {}
-    for batch in mcap.batches():
-        offsets.append(batch.offset)
-        if mcap.summary.chunks and not mcap.summary.moved:
-            _check_index(mcap, batch)
-        for number in np.unique(batch.channels).tolist():
-            rows = batch.channels == number
-            count = int(rows.sum())
-            counts[number] += count
-            if number not in mcap.channels:
-                mcap.problem(batch.offset, f'{count} messages belong to a channel that is lost')
+    for batch in file.batches():
+        file.check_batch(batch)
+        for number, rows in batch.by_channel():
+            counts[number] += len(rows)
+            if number not in file.channels:
+                text = f'{len(rows)} messages belong to a channel that is lost'
+                file.problem(batch.offset, text)
                 continue
             if number not in decoders:
-                decoders[number] = _stamp_decoder(mcap, number)
-            _note(report, mcap, number, batch, rows, decoders)
-    for channel in mcap.channels.values():
-        _topic(report, mcap, channel.id)
-    _check_end(mcap, counts, offsets)
-    report.problems += [
-        f'{mcap.path}: {problem.text} (at byte {problem.offset})' for problem in mcap.problems
-    ]
+                decoders[number] = _stamp_decoder(file, number)
+            _note(report, file, number, batch, rows, decoders)
+    for channel in file.channels.values():
+        _topic(report, file, channel.id)
+    if file.stated:
+        file.topic_counts({number: counts[number] for number in {*file.stated, *counts}})
+    file.check()
+    report.attachments += file.attachments
+    report.problems += file.told()
+    report.remarks += [f'{file.path}: {remark}' for remark in file.remarks]
 
 
-def _topic(report: Report, mcap: McapFile, number: int) -> TopicReport:
-    channel = mcap.channels[number]
-    schema = mcap.schemas.get(channel.schema_id)
+def _topic(report: Report, file: MessageFile, number: int) -> TopicReport:
+    channel = file.channels[number]
+    schema = file.schemas.get(channel.schema_id)
     return report.topics.setdefault(
         channel.topic, TopicReport(channel.topic, schema.name if schema else '')
     )
 
 
-def _stamp_decoder(mcap: McapFile, number: int) -> Decoder | None:
+def _stamp_decoder(file: MessageFile, number: int) -> Decoder | None:
     """Return a decoder for `header.stamp`, None where the topic has none or many sources."""
-    if mcap.channels[number].topic in SEVERAL:
+    if file.channels[number].topic in SEVERAL:
         return None
     try:
-        decoder = Decoder(mcap, number, [])
+        decoder = Decoder(file, number, [])
     except BagError:
         return None
     members = decoder.definition.get(decoder.kind, [])
@@ -159,10 +179,10 @@ def _stamp_decoder(mcap: McapFile, number: int) -> Decoder | None:
 
 def _note(
     report: Report,
-    mcap: McapFile,
+    file: MessageFile,
     number: int,
     batch: Batch,
-    rows: NDArray[np.bool_],
+    rows: NDArray[np.int64],
     decoders: dict[int, Decoder | None],
 ) -> None:
     log_time = batch.log_times(rows)
@@ -170,61 +190,9 @@ def _note(
     decoder = decoders[number]
     if decoder:
         try:
-            stamp = decoder.decode(batch, batch.starts[rows], batch.sizes[rows])['stamp']
+            columns = decoder.decode(batch, batch.starts[rows], batch.sizes[rows])
+            stamp = columns.get('stamp', log_time)
         except BagError as error:
-            mcap.problem(batch.offset, error.reason)
+            file.problem(batch.offset, error.reason)
             decoders[number] = None
-    _topic(report, mcap, number).note(log_time, stamp)
-
-
-def _check_index(mcap: McapFile, batch: Batch) -> None:
-    """Compare the message index of a chunk with its messages."""
-    entries = mcap.summary.chunks.get(batch.offset)
-    if entries is None:
-        mcap.problem(batch.offset, 'the chunk is missing in the index')
-        return
-    for number, at in entries.items():
-        rows = batch.channels == number
-        places = batch.starts[rows] - 31
-        pairs = np.stack([batch.log_times(rows), places], axis=1).astype('<u8')
-        content = struct.pack('<HI', number, pairs.nbytes)
-        size = HEAD.size + len(content) + pairs.nbytes
-        found = mcap.read_bytes(at, size)
-        same = found[: HEAD.size] == HEAD.pack(Op.MESSAGE_INDEX, size - HEAD.size) and (
-            found[HEAD.size : HEAD.size + 6] == content
-        )
-        if same:  # the entries may be in any order
-            listed = np.frombuffer(found[HEAD.size + 6 :], '<u8').reshape(-1, 2)
-            same = bool((np.sort(listed[:, 1]) == pairs[:, 1]).all()) and bool(
-                (listed[np.argsort(listed[:, 1]), 0] == pairs[:, 0]).all()
-            )
-        if not same:
-            mcap.problem(at, 'the message index does not match the chunk')
-
-
-def _check_end(mcap: McapFile, counts: Counter[int], offsets: list[int]) -> None:
-    summary = mcap.summary
-    if mcap.end and not summary.present:
-        mcap.problem(mcap.end, 'the summary is missing or damaged')
-    if mcap.end and mcap.crc and _crc(mcap) != mcap.crc:
-        mcap.problem(mcap.end, 'the data section is damaged: its CRC does not match')
-    if not summary.present:
-        return
-    missing = set(summary.chunks) - set(offsets)
-    if summary.moved:
-        mcap.problem(mcap.end, 'bytes are missing or were added before the summary')
-    elif missing:
-        mcap.problem(min(missing), f'{len(missing)} chunks of the index are lost')
-    for number, count in summary.counts.items():
-        if counts[number] != count:
-            topic = mcap.channels[number].topic if number in mcap.channels else number
-            mcap.problem(mcap.end, f'{topic}: {counts[number]} of {count} messages are left')
-
-
-def _crc(mcap: McapFile) -> int:
-    crc = at = 0
-    while at < mcap.end:
-        data = mcap.read_bytes(at, min(BLOCK, mcap.end - at))
-        crc = crc32(data, crc)
-        at += len(data)
-    return crc
+    _topic(report, file, number).timing.note(log_time, stamp)

@@ -10,17 +10,31 @@ class Limits:
     """
     Largest sizes that are read; anything beyond is damage.
 
-    :param record: content of one record [B].
+    :param record: content of one record that is kept in memory [B].
     :param chunk: decompressed chunk [B].
-    :param ratio: decompressed over compressed size of a chunk.
-    :param text: all schemas and channels together [B].
-    :param unpacked: a file that is compressed as a whole, decompressed [B].
+    :param messages: in one chunk.
+    :param ratio: decompressed over compressed size of a chunk; zstd cannot exceed it by much.
+    :param total: all chunks of a file, decompressed: so many bytes whatever its size,
+    :param total_ratio: and so many more for each byte of the file. Our writer stays below.
+    :param text: all schemas, channels and metadata together [B].
+    :param channels: in one file.
+    :param attachments: attachments and metadata records in one file.
+    :param yaml: `metadata.yaml` or a text of quality of service [B].
+    :param unpacked: a file that is compressed as a whole: so many bytes whatever its size,
+    :param unpacked_ratio: and so many more for each of its bytes.
     :param problems: number of damaged places after which the rest is given up.
     """
 
     record: int = 1 << 28
     chunk: int = 1 << 28
-    ratio: int = 2000
+    messages: int = 1 << 22
+    ratio: int = 1 << 17
+    total: int = 1 << 32
+    total_ratio: int = 1000
     text: int = 1 << 26
-    unpacked: int = 1 << 36
+    channels: int = 10_000
+    attachments: int = 100_000
+    yaml: int = 1 << 20
+    unpacked: int = 1 << 28
+    unpacked_ratio: int = 300
     problems: int = 10_000

@@ -12,16 +12,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damadics_fd.bag.cdr.decoder import Columns
-from damadics_fd.bag.columns import iter_columns, open_files, read_columns
+from damadics_fd.bag.cdr.definition import full_name
+from damadics_fd.bag.columns import iter_columns, listing, open_files, read_columns
 from damadics_fd.bag.errors import BagError, NoMeasurementError
+from damadics_fd.bag.mapping import SIGNALS, Source, parse_maps
 from damadics_fd.bag.sources import find_bags
 from damadics_fd.bag.tables import Table, read_table
 
 TABLES = ('.csv', '.txt', '.tsv')
 MEASUREMENT = 'damadics_msgs/msg/Measurement'
-SIGNALS = ('cv', 'x1', 'p1', 'p2', 't1', 'flow', 'ps')
 EPOCH = 10**17  # [ns] stamps from here on are dates, below they count from scenario zero
-_MAP = re.compile(r'(\w+)=([^*]+)(?:\*([-+.\deE]+))?')
+__all__ = ['SIGNALS', 'Recording', 'find_recordings', 'origin', 'parse_maps']
+_ELEMENT = re.compile(r'\[(\d+)\]$')  # of an array
 Told = Callable[[str], None]
 
 
@@ -33,33 +35,6 @@ def origin(stamp: int) -> int:
     :return: 0 for simulations, which count from scenario zero; the first stamp for real data.
     """
     return stamp if abs(stamp) >= EPOCH else 0
-
-
-def parse_maps(texts: Sequence[str]) -> dict[str, tuple[str, float]]:
-    """
-    Parse what the user says about where signals are.
-
-    :param texts: each `SIGNAL=SOURCE` or `SIGNAL=SOURCE*FACTOR`; the source is `/topic.field` in a
-        bag and a column in a table.
-    :return: source and factor to SI for each signal.
-    :raises BagError: where a text is none of these.
-
-    >>> parse_maps(['cv=/valve/setpoint.data*0.01'])
-    {'cv': ('/valve/setpoint.data', 0.01)}
-    """
-    maps = {}
-    for text in texts:
-        match = _MAP.fullmatch(text)
-        try:
-            if not match or match[1] not in (*SIGNALS, 't', 'stamp'):
-                raise ValueError
-            maps[match[1]] = match[2], float(match[3] or 1.0)
-        except ValueError:
-            raise BagError(
-                f'--map {text}: write SIGNAL=/topic.field or SIGNAL=COLUMN, then *FACTOR;'
-                f' SIGNAL is one of {", ".join(SIGNALS)}; in a table also t'
-            ) from None
-    return maps
 
 
 @dataclass(frozen=True)
@@ -75,7 +50,7 @@ class Recording:
 
     path: Path
     topic: str = '/measurement'
-    maps: Mapping[str, tuple[str, float]] = field(default_factory=dict)
+    maps: Mapping[str, Source] = field(default_factory=dict)
     table: Table | None = None
 
     @property
@@ -112,12 +87,17 @@ class Recording:
 
     def _mapped(self, on_problem: Told) -> Columns:
         """Read signals from several topics; each holds its value until its next message."""
-        parsed = {}
-        for signal, (source, factor) in self.maps.items():
-            topic, dot, name = source.partition('.')
+        parsed: dict[str, tuple[str, str, int | None]] = {}
+        for signal, source in self.maps.items():
+            topic, dot, name = source.name.partition('.')
             if not dot:
-                raise BagError(f'--map {signal}={source}: write /topic.field', self.path)
-            parsed[signal] = ('/' + topic.lstrip('/'), name, factor)
+                raise BagError(f'--map {signal}={source.name}: write /topic.field', self.path)
+            index = _ELEMENT.search(name)
+            parsed[signal] = (
+                topic,
+                _ELEMENT.sub('', name),
+                int(index[1]) if index else None,
+            )
         if not {'cv', 'x1'} <= parsed.keys():
             raise BagError('--map must name at least cv and x1', self.path)
         read = {
@@ -129,17 +109,49 @@ class Recording:
             )
             for topic in {topic for topic, _, _ in parsed.values()}
         }
-        base = _time(read[parsed['x1'][0]])
+        clock = self._clock(read)
+        base = read[parsed['x1'][0]][clock]
         columns: Columns = {'stamp': base}
-        for signal, (topic, name, factor) in parsed.items():
-            values = np.asarray(read[topic][name], float) * factor
-            columns[signal] = hold(_time(read[topic]), values, base)
+        for signal, (topic, name, element) in parsed.items():
+            values = np.asarray(read[topic][name], float)
+            if values.ndim > 1 and element is not None and element < values.shape[1]:
+                values = values[:, element]
+            if values.ndim != 1:
+                raise BagError(
+                    f'--map {signal}={topic}.{name}: the field is an array of'
+                    f' {values.shape[1]}; write {topic}.{name}[0]',
+                    self.path,
+                )
+            scaled = self.maps[signal].scale(values)
+            columns[signal] = hold(read[topic][clock], scaled, base)
         known = np.isfinite(columns['cv'])
+        if len(base) and not known.any():
+            raise BagError(
+                f'--map: no message of {parsed["cv"][0]} comes before the last one of'
+                f' {parsed["x1"][0]}',
+                self.path,
+            )
         return {name: column[known] for name, column in columns.items()}
 
+    def _clock(self, read: Mapping[str, Columns]) -> str:
+        """
+        Choose the one clock for signals of several topics: their stamps where all have them.
 
-def _time(columns: Columns) -> NDArray[np.int64]:
-    return columns['stamp' if 'stamp' in columns else 'log_time']
+        :raises BagError: where the recorder's clock cannot serve instead.
+        """
+        unstamped = [topic for topic, columns in read.items() if 'stamp' not in columns]
+        if not unstamped:
+            return 'stamp'
+        for topic, columns in read.items():
+            logged = columns['log_time']
+            if len(logged) > 1 and logged[0] == logged[-1]:
+                raise BagError(
+                    f'--map: {", ".join(sorted(unstamped))} has no header.stamp, and all messages'
+                    f' of {topic} were logged at the same instant: these topics have no clock in'
+                    ' common',
+                    self.path,
+                )
+        return 'log_time'
 
 
 def hold(stamp: NDArray, values: NDArray, at: NDArray) -> NDArray:
@@ -242,15 +254,16 @@ def measurement_topics(path: Path) -> dict[str, int]:
     counts: Counter[str] = Counter()
     damage: list[str] = []
     for mcap in open_files(path, damage.append):
-        sizes: Mapping[int, int] = mcap.summary.counts
+        sizes = mcap.stated
         if not mcap.channels:  # no summary: the channels are among the messages
-            sizes = Counter()
+            read: Counter[int] = Counter()
             for batch in mcap.batches():
-                sizes.update(batch.channels.tolist())
+                read.update({number: len(rows) for number, rows in batch.by_channel()})
+            sizes = read
         damage += [problem.text for problem in mcap.problems]
         for channel in mcap.channels.values():
             schema = mcap.schemas.get(channel.schema_id)
-            kinds[channel.topic] = schema.name if schema else ''
+            kinds[channel.topic] = full_name(schema.name) if schema else ''
             counts[channel.topic] += sizes.get(channel.id, 0) if sizes else 1
     if damage and not kinds:
         raise BagError(f'{damage[0]}, and nothing in it can be read', path)
@@ -261,7 +274,7 @@ def measurement_topics(path: Path) -> dict[str, int]:
     }
     if not topics:
         raise NoMeasurementError(
-            f'has no measurement; it has {", ".join(sorted(kinds)) or "no topic"}. Name the'
+            f'has no measurement; it has {listing(kinds)}. Name the'
             ' signals: --map cv=/topic.field --map x1=/topic.field',
             path,
         )

@@ -2,41 +2,74 @@
 # SPDX-License-Identifier: Apache-2.0
 """Save every intact message of a damaged bag into a new one."""
 
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import yaml
 
 from damadics_fd.bag import inspection
+from damadics_fd.bag.cdr.definition import installed_type, schema_text
 from damadics_fd.bag.errors import BagError
-from damadics_fd.bag.inspection import Report
+from damadics_fd.bag.inspection import LOSSY, UNUSABLE, WHOLE, Report
 from damadics_fd.bag.limits import Limits
-from damadics_fd.bag.mcap.reader import Batch, McapFile
+from damadics_fd.bag.mcap.reader import McapFile
+from damadics_fd.bag.mcap.records import Channel, Extent, Op, Schema, parse_attachment
 from damadics_fd.bag.mcap.writer import McapWriter
-from damadics_fd.bag.rosbag2 import METADATA_FILE, BagFile, BagMetadata, Topic
+from damadics_fd.bag.messages import MESSAGE_HEAD, Batch, MessageFile
+from damadics_fd.bag.opening import open_file
+from damadics_fd.bag.rosbag2 import METADATA_FILE, BagFile, BagMetadata, Topic, parse_qos
 from damadics_fd.bag.sources import bag_files
-from damadics_fd.bag.writer import WholeWrites
+from damadics_fd.bag.whole_writes import WholeWrites
+
+ROSBAG2 = 'rosbag2'  # name of the metadata that describes a bag
+MOST_NAMELESS = 16  # channels whose record is lost that are saved
+BLOCK = 1 << 22  # [B] of an attachment copied at a time
 
 
-def salvage(path: str | Path, out: str | Path, limits: Limits = Limits()) -> Report:
+@dataclass
+class Salvage:
+    """
+    What was found and what was saved.
+
+    :param found: the report on the damaged bag.
+    :param saved: the report on the new one, read back; None where nothing was written.
+    """
+
+    found: Report
+    saved: Report | None = None
+
+    @property
+    def code(self) -> int:
+        """Exit code: 0 nothing was lost, 3 something was, 1 nothing could be saved."""
+        if not self.saved or (self.found.messages and not self.saved.messages):
+            return UNUSABLE
+        return WHOLE if self.found.code == WHOLE and not self.missing else LOSSY
+
+    @property
+    def missing(self) -> int:
+        """Messages that could be read and are not in the new bag."""
+        return max(0, self.found.messages - (self.saved.messages if self.saved else 0))
+
+
+def salvage(path: str | Path, out: str | Path, limits: Limits = Limits()) -> Salvage:
     """
     Copy what is intact.
 
-    Messages, topics and metadata are copied byte for byte; indexes, statistics and, for a
-    directory, `metadata.yaml` are made anew.
+    Messages, topics, attachments and metadata are copied byte for byte; indexes, statistics and,
+    for a directory, `metadata.yaml` are made anew.
 
-    :param path: MCAP file or bag directory.
+    :param path: file or bag directory.
     :param out: file to write, or directory where `path` is one.
     :param limits: what the file may ask for.
-    :return: the report on `path`; its code is 0 where nothing was lost.
     :raises BagError: where `out` exists or cannot be written.
     """
     path, out = Path(path), Path(out)
-    if out.exists():
+    if out.exists() or out.is_symlink():
         raise BagError('exists; give another name', out)
-    report = inspection.inspect(path, limits)
-    if report.code == inspection.UNUSABLE:
-        return report
+    result = Salvage(inspection.inspect(path, limits))
+    if result.found.code == UNUSABLE:
+        return result
     topics: dict[str, Topic] = {}
     files: list[BagFile] = []
     try:
@@ -45,82 +78,156 @@ def salvage(path: str | Path, out: str | Path, limits: Limits = Limits()) -> Rep
         for source in bag_files(path):
             name = f'{out.name}_{len(files)}.mcap' if path.is_dir() else out.name
             target = out / name if path.is_dir() else out
-            copied = _copy(source, target, topics, limits)
-            if copied:
-                files.append(copied)
+            try:
+                file = open_file(source, tolerant=True, limits=limits)
+            except BagError:
+                continue  # the report has it
+            with file:
+                copy = _Copy(file, target, topics, result.found.code == WHOLE)
+                files.append(copy.run())
         if path.is_dir():
             text = BagMetadata(list(topics.values()), files).to_yaml()
             (out / METADATA_FILE).write_text(text, encoding='utf-8')
     except OSError as error:
         raise BagError(f'cannot be written: {error.strerror}', out) from error
-    return report
+    result.saved = inspection.inspect(out, limits)
+    return result
 
 
-def _copy(source: Path, target: Path, topics: dict[str, Topic], limits: Limits) -> BagFile | None:
-    try:
-        mcap = McapFile(source, tolerant=True, limits=limits)
-    except BagError:
-        return None  # the report has it
-    with mcap, WholeWrites(target) as stream:
-        file = BagFile(target.name)
-        writer = McapWriter(stream, mcap.profile or 'ros2')
-        declared: set[int] = set()
-        schemas: set[int] = set()
-        for batch in mcap.batches():
-            for channel in [c for c in mcap.channels.values() if c.id not in declared]:
-                schema = mcap.schemas.get(channel.schema_id)
-                if schema and schema.id not in schemas:
-                    schemas.add(schema.id)
-                    writer.put_schema(schema)
-                if schema or not channel.schema_id:
-                    declared.add(channel.id)
-                    writer.put_channel(channel)
-                    topics.setdefault(channel.topic, _topic(mcap, channel.id))
-            _write(writer, batch, declared, mcap, file)
-        for name, entries in mcap.metadata:
-            if name != 'rosbag2':
-                writer.add_metadata(name, entries)
-        metadata = BagMetadata(list(topics.values()), [file]).to_yaml(root=False)
-        writer.add_metadata('rosbag2', {'serialized_metadata': metadata})
-        writer.finish()
-    return file
+class _Copy:
+    """
+    Copy one file.
+
+    :param file: the file.
+    :param target: the new one.
+    :param topics: gets the topics.
+    :param whole: nothing is lost, so that what describes the bag still holds.
+    """
+
+    def __init__(self, file: MessageFile, target: Path, topics: dict[str, Topic], whole: bool):
+        self._file, self._target = file, target
+        self._topics, self._whole = topics, whole
+        self._declared: set[int] = set()
+        self._schemas: set[int] = set()
+        self._nameless = 0
+
+    def run(self) -> BagFile:
+        """Copy everything; return what was written."""
+        written = BagFile(self._target.name)
+        with WholeWrites(self._target) as stream:
+            self._writer = McapWriter(stream, self._file.profile)
+            for batch in self._file.batches():
+                used = {number for number, _ in batch.by_channel()}
+                known = list(self._file.channels.values())
+                # a schema comes before its messages, not always before its channel
+                self._declare([c for c in known if c.id in used or self._complete(c)])
+                self._declare(self._lost(used))
+                self._write(batch, written)
+            self._declare(list(self._file.channels.values()))
+            described = isinstance(self._file, McapFile) and self._extras(self._file)
+            if not described and self._file.profile == 'ros2':
+                names = {channel.topic for channel in self._file.channels.values()}
+                topics = [topic for name, topic in self._topics.items() if name in names]
+                text = BagMetadata(topics, [written]).to_yaml(root=False)
+                self._writer.add_metadata(ROSBAG2, {'serialized_metadata': text})
+            self._writer.finish()
+        return written
+
+    def _declare(self, channels: list[Channel]) -> None:
+        """Write channels that are new, each with what is known of its schema."""
+        for channel in channels:
+            if channel.id in self._declared:
+                continue
+            schema = self._file.schemas.get(channel.schema_id) if channel.schema_id else None
+            if channel.schema_id and not schema:
+                schema = _installed(channel)
+            if schema and schema.id not in self._schemas:
+                self._schemas.add(schema.id)
+                self._writer.put_schema(schema)
+            number = schema.id if schema else 0
+            self._declared.add(channel.id)
+            self._writer.put_channel(
+                Channel(
+                    channel.id,
+                    number,
+                    channel.topic,
+                    channel.message_encoding,
+                    channel.metadata,
+                )
+            )
+            self._topics.setdefault(channel.topic, _topic(channel, schema))
+
+    def _complete(self, channel: Channel) -> bool:
+        return not channel.schema_id or channel.schema_id in self._file.schemas
+
+    def _lost(self, used: set[int]) -> list[Channel]:
+        """Return stand-ins for channels whose record is lost."""
+        found = sorted(used - self._declared)[: MOST_NAMELESS - self._nameless]
+        self._nameless += len(found)
+        return [Channel(number, 0, f'/lost_channel_{number}', '', {}) for number in found]
+
+    def _write(self, batch: Batch, written: BagFile) -> None:
+        rows = np.flatnonzero(np.isin(batch.channels, list(self._declared)))
+        if not len(rows):
+            return
+        log_times = batch.log_times(rows)
+        begins = batch.starts[rows] - MESSAGE_HEAD
+        ends = batch.starts[rows] + batch.sizes[rows]
+        if (begins[1:] == ends[:-1]).all():
+            data = batch.data[begins[0] : ends[-1]].tobytes()
+        else:
+            pairs = zip(begins.tolist(), ends.tolist(), strict=True)
+            data = b''.join(batch.data[a:b].tobytes() for a, b in pairs)
+        sizes = ends - begins
+        offsets = np.cumsum(sizes) - sizes
+        self._writer.add_records(data, batch.channels[rows], log_times.view(np.uint64), offsets)
+        start, end = int(log_times.min()), int(log_times.max())
+        for number, part in batch.by_channel():
+            if number in self._declared:
+                known = self._file.channels.get(number)
+                topic = known.topic if known else f'/lost_channel_{number}'
+                written.note(topic, start, end, len(part))
+
+    def _extras(self, mcap: McapFile) -> bool:
+        """Copy attachments and metadata; tell whether one of them describes the bag."""
+        described = False
+        metadata = iter(mcap.metadata)
+        for extent in mcap.extras:
+            if extent.op == Op.ATTACHMENT:
+                about = parse_attachment(mcap.read_bytes, extent.at)
+                self._writer.put_attachment(about, extent.length, _blocks(mcap, extent))
+                continue
+            name, _ = next(metadata, ('', {}))
+            if name == ROSBAG2 and not self._whole:
+                continue  # its counts no longer hold
+            described |= name == ROSBAG2
+            self._writer.put_metadata(name, mcap.read_bytes(extent.at, extent.length))
+        return described or (self._whole and not _describes(mcap))
 
 
-def _write(
-    writer: McapWriter, batch: Batch, declared: set[int], mcap: McapFile, file: BagFile
-) -> None:
-    rows = np.flatnonzero(np.isin(batch.channels, list(declared)))
-    if not len(rows):
-        return
-    log_times = batch.log_times(rows)
-    begins, ends = batch.starts[rows] - 31, batch.starts[rows] + batch.sizes[rows]
-    if (begins[1:] == ends[:-1]).all():
-        data = batch.data[begins[0] : ends[-1]].tobytes()
-    else:
-        data = b''.join(batch.data[a:b].tobytes() for a, b in zip(begins, ends, strict=True))
-    sizes = ends - begins
-    offsets = np.cumsum(sizes) - sizes
-    channels = batch.channels[rows]
-    writer.add_records(data, channels, log_times.view(np.uint64), offsets)
-    start, end = int(log_times.min()), int(log_times.max())
-    file.start = min(start, file.start) if file.counts else start
-    file.end = max(end, file.end) if file.counts else end
-    for number, count in zip(*np.unique(channels, return_counts=True), strict=True):
-        name = mcap.channels[int(number)].topic
-        file.counts[name] = file.counts.get(name, 0) + int(count)
+def _describes(mcap: McapFile) -> bool:
+    return any(name == ROSBAG2 for name, _ in mcap.metadata)
 
 
-def _topic(mcap: McapFile, number: int) -> Topic:
-    channel = mcap.channels[number]
-    schema = mcap.schemas.get(channel.schema_id)
-    try:
-        offered = yaml.safe_load(channel.metadata.get('offered_qos_profiles', ''))
-    except yaml.YAMLError:
-        offered = None
-    profiles = [p for p in offered if isinstance(p, dict)] if isinstance(offered, list) else []
+def _blocks(mcap: McapFile, extent: Extent) -> Iterator[bytes]:
+    end = extent.at + extent.length
+    for at in range(extent.at, end, BLOCK):
+        yield mcap.read_bytes(at, min(BLOCK, end - at))
+
+
+def _installed(channel: Channel) -> Schema | None:
+    """Return the installed definition where a schema is lost and its hash is known."""
+    name = installed_type(channel.metadata.get('topic_type_hash', ''))
+    if not name:
+        return None
+    return Schema(channel.schema_id, name, 'ros2msg', schema_text(name).encode())
+
+
+def _topic(channel: Channel, schema: Schema | None) -> Topic:
     return Topic(
         channel.topic,
         schema.name if schema else '',
-        profiles,
+        parse_qos(channel.metadata.get('offered_qos_profiles', '')[: Limits().yaml]),
         channel.metadata.get('topic_type_hash', ''),
+        channel.message_encoding,
     )

@@ -5,66 +5,76 @@
 import re
 from pathlib import Path
 
-import yaml
-
 from damadics_fd.bag.errors import BagError
-from damadics_fd.bag.rosbag2 import METADATA_FILE, METADATA_ROOT
+from damadics_fd.bag.rosbag2 import METADATA_FILE, read_metadata
 
-SUFFIXES = ('.mcap', '.mcap.zstd')
+SUFFIXES = ('.mcap', '.mcap.zstd', '.db3', '.db3.zstd')
+DEEPEST = 64  # folders within folders that are searched
+_NUMBER = re.compile(r'_(\d{1,9})\.(?:mcap|db3)')
 
 
-def is_mcap(path: Path) -> bool:
-    """Tell whether a file is an MCAP file by its name."""
-    return path.is_file() and path.name.endswith(SUFFIXES)
+def is_bag_file(path: Path) -> bool:
+    """Tell whether a file holds messages, by its name."""
+    return path.name.endswith(SUFFIXES) and path.is_file()
 
 
 def _by_number(path: Path) -> tuple[str, int]:
-    number = re.search(r'_(\d+)\.mcap', path.name)
+    number = _NUMBER.search(path.name)
     return (path.name[: number.start()], int(number[1])) if number else (path.name, -1)
 
 
 def bag_files(path: str | Path) -> list[Path]:
     """
-    List the MCAP files of one bag in order.
+    List the files of one bag in order.
 
-    :param path: MCAP file, or bag directory with or without `metadata.yaml`.
+    :param path: file, or bag directory with or without `metadata.yaml`.
     :return: existing files.
     :raises BagError: where there are none.
     """
     path = Path(path)
-    if not path.is_dir():
-        if not path.exists():
-            raise BagError('does not exist', path)
-        return [path]
-    present = sorted(filter(is_mcap, path.iterdir()), key=_by_number)
-    listed = [path / name for name in _listed(path / METADATA_FILE)]
-    files = [file for file in listed if file in present]
+    try:
+        if not path.is_dir():
+            if not path.exists():
+                raise BagError('does not exist', path)
+            return [path]
+        present = sorted(filter(is_bag_file, path.iterdir()), key=_by_number)
+    except (OSError, ValueError) as error:  # too long a name, a NUL in it, no permission
+        raise BagError(f'cannot be read: {error}', path) from error
+    stated = read_metadata(path)
+    listed = [_present(path, name) for name in stated.files] if stated else []
+    files = [file for file in dict.fromkeys(listed) if file in present]
     files += [file for file in present if file not in files]  # those a crash left unlisted
     if not files:
-        foreign = next(path.glob('*.db3'), None)
-        raise BagError(
-            'is an SQLite bag; convert it: ros2 bag convert with storage_id mcap'
-            if foreign
-            else 'holds no .mcap file; give a bag, or a folder of bags',
-            path,
-        )
+        raise BagError('holds no .mcap file; give a bag, or a folder of bags', path)
     return files
 
 
-def _listed(metadata: Path) -> list[str]:
-    """Return the file names in `metadata.yaml`, none where it is absent or unreadable."""
-    try:
-        information = yaml.safe_load(metadata.read_text(encoding='utf-8'))[METADATA_ROOT]
-        return [str(name) for name in information['relative_file_paths']]
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, TypeError, KeyError):
-        return []  # the files themselves say everything that is needed
+def _present(folder: Path, name: str) -> Path | None:
+    """Return the file that `metadata.yaml` means: old ones name the folder, too."""
+    short = Path(name).name
+    plain = short.removesuffix('.zstd')
+    for candidate in (short, plain, plain + '.zstd'):
+        if candidate and '\0' not in candidate and is_bag_file(folder / candidate):
+            return folder / candidate
+    return None
+
+
+def missing_files(path: str | Path) -> list[str]:
+    """Tell which files `metadata.yaml` lists that are not there."""
+    path = Path(path)
+    stated = read_metadata(path) if path.is_dir() else None
+    return [
+        f'{name} is listed in {METADATA_FILE} and is not there'
+        for name in (stated.files if stated else ())
+        if _present(path, name) is None
+    ]
 
 
 def find_bags(path: str | Path) -> list[Path]:
     """
     List the bags that a path names.
 
-    :param path: MCAP file, bag directory, or folder of such at any depth.
+    :param path: file, bag directory, or folder of such at any depth.
     :return: one path per bag; the files of a split bag count as one.
     :raises BagError: where there is none.
     """
@@ -74,13 +84,17 @@ def find_bags(path: str | Path) -> list[Path]:
     return _bags_within(path) or ([path] if bag_files(path) else [])
 
 
-def _bags_within(folder: Path) -> list[Path]:
+def _bags_within(folder: Path, depth: int = 0) -> list[Path]:
     if (folder / METADATA_FILE).is_file():
         return [folder]
-    entries = sorted(folder.iterdir())
-    files = sorted(filter(is_mcap, entries), key=_by_number)
+    try:
+        entries = sorted(folder.iterdir())
+    except OSError as error:
+        raise BagError(f'cannot be read: {error.strerror}', folder) from error
+    files = sorted(filter(is_bag_file, entries), key=_by_number)
     names = {_by_number(file)[0] for file in files}
-    numbered = len(names) == 1 and all(_by_number(file)[1] >= 0 for file in files)
+    kinds = {file.name.removesuffix('.zstd').rsplit('.', 1)[-1] for file in files}
+    numbered = len(names) == len(kinds) == 1 and all(_by_number(file)[1] >= 0 for file in files)
     if numbered and (len(files) > 1 or folder.name in names):
         files = [folder]  # a split bag, or one that a crash left without metadata.yaml
     inner = [
@@ -88,4 +102,6 @@ def _bags_within(folder: Path) -> list[Path]:
         for entry in entries
         if entry.is_dir() and not entry.is_symlink() and not entry.name.startswith('.')
     ]
-    return [*files, *(bag for entry in inner for bag in _bags_within(entry))]
+    if depth >= DEEPEST:
+        return files
+    return [*files, *(bag for entry in inner for bag in _bags_within(entry, depth + 1))]

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damadics_fd.bag.errors import BagError, NoMeasurementError
+from damadics_fd.bag.mapping import Source
 
 ROWS = 100_000  # read at a time
 SECOND = 1e9  # [ns]
@@ -161,7 +162,7 @@ def parse_cell(text: str) -> float:
 def read_table(
     path: str | Path,
     actuator: int | None = None,
-    chosen: Mapping[str, tuple[str, float]] = {},
+    chosen: Mapping[str, Source] = {},
 ) -> list[Table]:
     """
     Find the actuators in a text file.
@@ -206,7 +207,7 @@ def read_table(
 
 
 def _actuators(
-    names: list[str], actuator: int | None, chosen: Mapping[str, tuple[str, float]]
+    names: list[str], actuator: int | None, chosen: Mapping[str, Source]
 ) -> dict[str, dict[str, Use]]:
     """Return for each actuator where its columns are."""
     own: dict[str, Use] = {}
@@ -216,7 +217,8 @@ def _actuators(
         elif name in _OWN or name in _SCALED:
             target, factor = _OWN.get(name) or _SCALED[name]
             own[target] = i, factor
-    for target, (name, factor) in chosen.items():
+    for target, source in chosen.items():
+        name, factor = source.name, source.scale.factor
         if name not in names:
             raise BagError(
                 f'--map {target}={name}: there is no such column; there are ' + ', '.join(names)

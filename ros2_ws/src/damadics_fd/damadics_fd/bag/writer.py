@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Write bags as rosbag2 does, so that `ros2 bag`, Foxglove, `rosbags` and `mcap` read them."""
 
-import io
-import os
 import time
 from collections.abc import Mapping, Sequence
 from functools import partial
@@ -23,48 +21,13 @@ from damadics_fd.bag.rosbag2 import (
     BagMetadata,
     QosProfile,
     Topic,
-    dump_yaml,
     qos,
+    qos_text,
 )
+from damadics_fd.bag.whole_writes import WholeWrites
 
 FLUSH_PERIOD = 0.5  # [s] a crash loses at most what came since the last flush
 NANO = 1_000_000_000
-
-
-class WholeWrites(io.RawIOBase):
-    """
-    A new file in which each write is complete or, where the disk is full, leaves no trace.
-
-    :param path: file to create or replace.
-    """
-
-    def __init__(self, path: Path):
-        self._fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666)
-        self._end = 0
-
-    def writable(self) -> bool:
-        """Tell that the file can be written."""
-        return True
-
-    def write(self, data: Any) -> int:
-        """Append all of `data`."""
-        view = memoryview(data).cast('B')
-        done = 0
-        try:
-            while done < len(view):
-                done += os.write(self._fd, view[done:])
-        except OSError:
-            os.ftruncate(self._fd, self._end)
-            os.lseek(self._fd, self._end, os.SEEK_SET)
-            raise
-        self._end += done
-        return done
-
-    def close(self) -> None:
-        """Close the file."""
-        if not self.closed:
-            super().close()
-            os.close(self._fd)
 
 
 class BagWriter:
@@ -135,7 +98,10 @@ class BagWriter:
         try:
             self._stream = WholeWrites(self._folder / name)
         except OSError as error:
-            raise BagError(f'cannot write: {error.strerror}', self._folder / name) from error
+            remedy = '; give another name' if isinstance(error, FileExistsError) else ''
+            raise BagError(
+                f'cannot write: {error.strerror}{remedy}', self._folder / name
+            ) from error
         self._number += 1
         self._channels.clear()
         self._schemas.clear()
@@ -172,9 +138,8 @@ class BagWriter:
             if topic.type not in self._schemas:
                 text = schema_text(topic.type).encode()
                 self._schemas[topic.type] = self._mcap.add_schema(topic.type, 'ros2msg', text)
-            offered = [dict(profile) for profile in topic.offered_qos]
             metadata = {
-                'offered_qos_profiles': dump_yaml(offered),
+                'offered_qos_profiles': qos_text(topic.offered_qos),
                 'topic_type_hash': topic.type_hash,
             }
             channel = self._mcap.add_channel(
@@ -182,14 +147,6 @@ class BagWriter:
             )
             self._channels[topic.name] = channel
         return channel
-
-    def _note(self, topic: Topic, start: int, end: int, count: int) -> None:
-        file = self._file
-        if file.counts:
-            file.start, file.end = min(start, file.start), max(end, file.end)
-        else:
-            file.start, file.end = start, end
-        file.counts[topic.name] = file.counts.get(topic.name, 0) + count
 
     def write(self, topic: Topic, data: bytes, log_time: int, publish_time: int) -> None:
         """
@@ -203,7 +160,7 @@ class BagWriter:
         if self._split_bytes or self._split_time:
             self._split_if_due(log_time)
         channel = self._channel(topic)
-        self._note(topic, log_time, log_time, 1)
+        self._file.note(topic.name, log_time, log_time, 1)
         self._mcap.add_message(channel, data, log_time, publish_time)
 
     def write_columns(
@@ -228,7 +185,7 @@ class BagWriter:
             topic = self._topics[name]
             payloads.append(stamped_encoder(topic.type, frame_id)(columns, stamp))
             channels.append(self._channel(topic))
-            self._note(topic, int(stamp[0]), int(stamp[-1]), len(stamp))
+            self._file.note(name, int(stamp[0]), int(stamp[-1]), len(stamp))
         self._mcap.add_rows(channels, stamp, payloads)
 
     def _split_if_due(self, log_time: int) -> None:

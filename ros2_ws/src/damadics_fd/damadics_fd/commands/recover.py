@@ -5,7 +5,7 @@
 import sys
 from pathlib import Path
 
-from damadics_fd.bag.errors import BagError
+from damadics_fd.bag.errors import BagError, printable
 from damadics_fd.bag.inspection import UNUSABLE
 from damadics_fd.bag.salvage import salvage
 from damadics_fd.commands.verify import print_report
@@ -22,24 +22,31 @@ def main(args: list[str] | None = None) -> int:
     parser = command_parser(
         'recover', 'Copy every intact message of a damaged bag to a new one.', EXAMPLE
     )
-    parser.add_argument('bag', type=Path, metavar='BAG', help='MCAP file or bag directory')
+    parser.add_argument(
+        'bag', type=Path, metavar='BAG', help='MCAP file, SQLite bag or bag directory'
+    )
     parser.add_argument(
         '--out',
         type=Path,
         required=True,
         metavar='BAG',
-        help='file to write, a directory where BAG is one',
+        help='MCAP file to write, a directory where BAG is one',
     )
     options = parser.parse_args(args)
     try:
-        report = salvage(options.bag, options.out)
+        result = salvage(options.bag, options.out)
     except BagError as error:
         print(f'recover: {error}', file=sys.stderr)
         return UNUSABLE
-    print_report(report)
-    if report.code != UNUSABLE:
-        print(f'saved {report.messages} messages: {options.out}')
-    return report.code
+    print_report(result.found)
+    if not result.saved:
+        return UNUSABLE
+    for problem in result.saved.problems:
+        print(printable(f'in the new bag: {problem}'), file=sys.stderr)
+    if result.missing:
+        print(f'{result.missing} messages that can be read were not saved', file=sys.stderr)
+    print(f'saved {result.saved.messages} messages: {printable(str(options.out))}')
+    return result.code
 
 
 if __name__ == '__main__':

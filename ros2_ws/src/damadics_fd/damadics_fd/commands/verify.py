@@ -5,6 +5,7 @@
 import sys
 from pathlib import Path
 
+from damadics_fd.bag.errors import printable
 from damadics_fd.bag.inspection import LOSSY, UNUSABLE, WHOLE, Report, inspect
 from damadics_fd.ros.arguments import command_parser
 
@@ -18,11 +19,15 @@ example:
 
 def print_report(report: Report) -> None:
     """Print what a bag holds and its verdict; problems go to stderr."""
-    print(
-        f'{report.path}: {report.files} file(s), {report.size} bytes, {report.messages} messages'
-    )
+    name = printable(str(report.path))
+    print(f'{name}: {report.files} file(s), {report.size} bytes, {report.messages} messages')
     rows = [
-        (topic.name, topic.type, str(topic.count), f'{(topic.end - topic.start) / 1e9:.3f} s')
+        (
+            printable(topic.name),
+            printable(topic.type),
+            str(topic.count),
+            f'{(topic.timing.end - topic.timing.start) / 1e9:.3f} s',
+        )
         for topic in report.topics.values()
     ]
     widths = [max((len(row[i]) for row in rows), default=0) for i in range(4)]
@@ -32,12 +37,12 @@ def print_report(report: Report) -> None:
             f'  {duration:>{widths[3]}}'
         )
     for remark in report.remarks:
-        print(f'  remark: {remark}')
+        print(f'  remark: {printable(remark)}')
     for problem in report.problems[:SHOWN]:
-        print(problem, file=sys.stderr)
+        print(printable(problem), file=sys.stderr)
     if len(report.problems) > SHOWN:
         print(f'and {len(report.problems) - SHOWN} more problems', file=sys.stderr)
-    print(f'{report.path}: {VERDICTS[report.code]}')
+    print(f'{printable(str(report.path))}: {VERDICTS[report.code]}')
 
 
 def main(args: list[str] | None = None) -> int:

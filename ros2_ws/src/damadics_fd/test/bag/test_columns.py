@@ -5,14 +5,8 @@
 import numpy as np
 import pytest
 import zstandard
-from damadics_fd.bag import (
-    BagError,
-    BagWriter,
-    iter_columns,
-    loading,
-    read_columns,
-    write_columns,
-)
+from damadics_fd.bag import BagError, BagWriter, iter_columns, read_columns, write_columns
+from damadics_fd.bag.mcap import loading
 from damadics_fd.bag.mcap.reader import McapFile
 from damadics_fd.bag.mcap.writer import McapWriter
 from damadics_fd.bag.sources import find_bags
@@ -177,7 +171,7 @@ def test_a_file_compressed_as_a_whole_is_read(tmp_path):
     ('content', 'reason'),
     [
         (b'', 'is empty'),
-        (b'SQLite format 3\0', 'convert it'),
+        (b'SQLite format 3\0', 'damaged SQLite bag'),
         (b'#ROSBAG V2.0\n', 'ROS 1 bag'),
         (b'hello, world', 'does not start as an MCAP file'),
     ],

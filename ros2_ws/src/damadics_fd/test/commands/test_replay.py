@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from damadics_fd.bag import BagError, BagWriter, read_columns, write_columns
-from damadics_fd.bag.recording import Recording, find_recordings, parse_maps
+from damadics_fd.bag import BagWriter, read_columns, write_columns
+from damadics_fd.bag.recording import Recording, find_recordings
 from damadics_fd.bag.tables import LUBLIN
 from damadics_fd.commands.replay import output
 from damadics_fd.commands.replay.replay import main, unique_stems
@@ -182,12 +182,3 @@ def test_parquet_without_its_library_is_refused_at_once(tmp_path, capsys, monkey
     assert main([str(tmp_path / 'a.mcap'), '--mode', 'paper', '--out', str(out)]) == 1
     assert 'pip install pyarrow' in capsys.readouterr().err
     assert not out.exists()
-
-
-def test_maps_name_signal_source_and_factor():
-    assert parse_maps(['x1=/a/b.c.d*1e-2', 'cv=CV']) == {
-        'x1': ('/a/b.c.d', 0.01),
-        'cv': ('CV', 1.0),
-    }
-    with pytest.raises(BagError, match='SIGNAL is one of'):
-        parse_maps(['speed=/a.b'])

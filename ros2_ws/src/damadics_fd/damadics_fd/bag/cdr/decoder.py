@@ -15,10 +15,11 @@ from damadics_fd.bag.cdr.groups import Alike, first_message
 from damadics_fd.bag.cdr.kernels import LOG_TIME, Words
 from damadics_fd.bag.cdr.layout import Layout, Place, layout_of
 from damadics_fd.bag.errors import BagError
-from damadics_fd.bag.mcap.reader import Batch, McapFile
+from damadics_fd.bag.messages import Batch, MessageFile
 
 Columns = dict[str, NDArray[Any]]
 MOST_LAYOUTS = 64  # in one chunk, that are looked for by column
+MOST_PLACES = 1 << 17  # of the layouts that are remembered
 _ELEMENT = re.compile(r'\.\d+(\.|$)')  # a member of a sequence of messages: no column
 
 
@@ -32,7 +33,7 @@ class Decoder:
     :raises BagError: where the messages are not CDR of a known definition.
     """
 
-    def __init__(self, mcap: McapFile, number: int, fields: Sequence[str] | None):
+    def __init__(self, mcap: MessageFile, number: int, fields: Sequence[str] | None):
         channel = mcap.channels[number]
         schema = mcap.schemas.get(channel.schema_id)
         self._mcap, self._number = mcap, number
@@ -44,12 +45,12 @@ class Decoder:
             )
         if schema is None or schema.encoding != 'ros2msg':
             raise BagError(f'{channel.topic} has no ros2msg definition', mcap.path)
-        self.kind = schema.name
         try:
             text = schema.data.decode()
             self.definition: Definition = parse_definition(schema.name, text)
         except (BagError, UnicodeDecodeError) as error:
             raise BagError(f'{channel.topic}: {error}', mcap.path) from error
+        self.kind = next(iter(self.definition))  # a foreign name may stand in another form
         self._layouts: list[Layout] = []
         self._alike: Alike | None = None
 
@@ -146,6 +147,8 @@ class Decoder:
         except BagError as error:
             raise BagError(f'{self.topic}: {error.reason}', self.path) from error
         self._layouts = [*self._layouts[-MOST_LAYOUTS:], layout]
+        while len(self._layouts) > 1 and sum(len(k.places) for k in self._layouts) > MOST_PLACES:
+            self._layouts.pop(0)
         return layout
 
     def _columns(self, words: Words, starts: NDArray, layout: Layout) -> Columns:
@@ -204,6 +207,8 @@ def _time(words: Words, at: NDArray, order: str) -> NDArray[np.int64]:
 
 def _field(words: Words, starts: NDArray, place: Place, order: str) -> NDArray:
     """Gather any field: numbers, arrays, strings."""
+    if place.text and place.dtype == 'u4':
+        return _wide(words, starts, place, order)
     if place.text:
         width = place.repeat or 0
         rows = words.w1[starts[:, None] + (place.offset + np.arange(width))]
@@ -218,6 +223,16 @@ def _field(words: Words, starts: NDArray, place: Place, order: str) -> NDArray:
         return _ordered(source[starts + place.offset], order).view(place.dtype)
     at = starts[:, None] + (place.offset + size * np.arange(place.repeat))
     return _ordered(source[at], order).view(place.dtype)
+
+
+def _wide(words: Words, starts: NDArray, place: Place, order: str) -> NDArray:
+    """Gather a wstring, whose units of UTF-16 take four bytes each."""
+    count = place.repeat or 0
+    if not count:
+        return np.zeros(len(starts), 'U1')
+    units = _ordered(words.w4[starts[:, None] + (place.offset + 4 * np.arange(count))], order)
+    texts = [row.tobytes().decode('utf-16-le', 'replace') for row in units.astype('<u2')]
+    return np.array(texts, 'U')
 
 
 def _merge(groups: list[tuple[NDArray, Columns]]) -> Columns:

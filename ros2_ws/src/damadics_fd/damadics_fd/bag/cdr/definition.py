@@ -30,6 +30,10 @@ PRIMITIVES = {
 }
 _FIELD = re.compile(r'^([\w/]+)(<=\d+)?(\[(<=)?(\d*)\])?\s+(\w+)(\s+.*|\s*=.*)?$')
 _MOST_TYPES = 1000  # in one schema; a hostile file may say anything
+_MOST_MEMBERS = 20_000  # of all its types together
+_MOST_DIGITS = 10  # of the length of an array
+DEEPEST = 64  # types within types
+STRINGS = ('string', 'wstring')
 
 
 class Member(NamedTuple):
@@ -43,9 +47,14 @@ class Member(NamedTuple):
 Definition = dict[str, list[Member]]  # full type name, members
 
 
-def _full_name(name: str, package: str) -> str:
-    """Complete a type name as ROS resolves it."""
-    if name in PRIMITIVES or name in ('string', 'wstring'):
+def full_name(name: str, package: str = '') -> str:
+    """
+    Complete a type name as ROS resolves it.
+
+    >>> full_name('a/B'), full_name('B', 'a'), full_name('a/msg/B')
+    ('a/msg/B', 'a/msg/B', 'a/msg/B')
+    """
+    if name in PRIMITIVES or name in STRINGS:
         return name
     parts = name.split('/')
     if len(parts) == 1:
@@ -62,7 +71,9 @@ def _members(text: str, package: str) -> list[Member]:
             continue  # empty, comment or constant
         if not match:
             raise BagError(f'the message definition has a line that is no field: {line[:80]!r}')
-        kind = _full_name(match[1], package)
+        kind = full_name(match[1], package)
+        if len(match[5] or '') > _MOST_DIGITS:
+            raise BagError(f'the message definition has an endless array: {line[:80]!r}')
         count = None if match[3] is None else -1 if match[4] or not match[5] else int(match[5])
         members.append(Member(match[6], kind, count))
     return members
@@ -74,7 +85,7 @@ def parse_definition(name: str, text: str) -> Definition:
 
     :param name: type of the message, `package/msg/Type`.
     :param text: its definition, those of the types it contains following `MSG:` lines.
-    :return: the members of each type by its full name.
+    :return: the members of each type by its full name, the message's own first.
     :raises BagError: where the text is no definition.
 
     >>> parse_definition('a/msg/B', 'float64[3] x  # [m]')
@@ -83,14 +94,23 @@ def parse_definition(name: str, text: str) -> Definition:
     sections = re.split(r'^={80}\r?\nMSG: *(\S+) *\r?$', text, flags=re.MULTILINE)
     if len(sections) > 2 * _MOST_TYPES:
         raise BagError(f'the schema of {name} defines more than {_MOST_TYPES} types')
-    definition = {_full_name(name, ''): _members(sections[0], name.split('/')[0])}
+    definition = {full_name(name): _members(sections[0], name.split('/')[0])}
     for kind, body in zip(sections[1::2], sections[2::2], strict=True):
-        definition[_full_name(kind, '')] = _members(body, kind.split('/')[0])
+        definition.setdefault(full_name(kind), _members(body, kind.split('/')[0]))
+    if sum(map(len, definition.values())) > _MOST_MEMBERS:
+        raise BagError(f'the schema of {name} has more than {_MOST_MEMBERS} fields')
     for members in definition.values():
         for member in members:
-            if member.type not in (*PRIMITIVES, 'string', 'wstring', *definition):
+            kind = member.type
+            if not (kind in PRIMITIVES or kind in STRINGS or kind in definition):
                 raise BagError(f'the schema of {name} does not define {member.type}')
     return definition
+
+
+def _shares() -> list[Path]:
+    """Return the folders of installed interface files, as ament looks for them."""
+    prefixes = [*os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep), sys.prefix]
+    return [Path(prefix, 'share') for prefix in filter(None, prefixes)]
 
 
 def _share_file(name: str, suffix: str) -> Path:
@@ -99,9 +119,8 @@ def _share_file(name: str, suffix: str) -> Path:
         package, folder, short = name.split('/')
     except ValueError:
         raise BagError(f'{name!r} is not a message type; write package/msg/Type') from None
-    prefixes = [*os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep), sys.prefix]
-    for prefix in filter(None, prefixes):
-        path = Path(prefix, 'share', package, folder, short + suffix)
+    for share in _shares():
+        path = share / package / folder / (short + suffix)
         if path.is_file():
             return path
     raise BagError(
@@ -128,7 +147,10 @@ def schema_text(name: str) -> str:
             members = _members(bodies[kind], kind.split('/')[0])
             waiting += [m.type for m in members if '/' in m.type]
     top = bodies.pop(name)
-    return top + ''.join(f'{SEPARATOR}\nMSG: {kind}\n{text}' for kind, text in bodies.items())
+    # `MSG: package/Type`, as rosbag2 writes it: strict readers look for the name that fields use
+    return top + ''.join(
+        f'{SEPARATOR}\nMSG: {kind.replace("/msg/", "/")}\n{text}' for kind, text in bodies.items()
+    )
 
 
 @cache
@@ -142,3 +164,23 @@ def type_hash(name: str) -> str:
     """
     hashes = json.loads(_share_file(name, '.json').read_text(encoding='utf-8'))['type_hashes']
     return str(next(entry['hash_string'] for entry in hashes if entry['type_name'] == name))
+
+
+@cache
+def installed_type(hash_: str) -> str:
+    """
+    Return the installed message type of a hash, '' where there is none.
+
+    :param hash_: `RIHS01_` and 64 hexadecimal digits.
+    """
+    if not re.fullmatch(r'RIHS01_[0-9a-f]{64}', hash_):
+        return ''
+    for share in _shares():
+        for path in sorted(share.glob('*/msg/*.json')):
+            name = f'{path.parent.parent.name}/msg/{path.stem}'
+            try:
+                if type_hash(name) == hash_:
+                    return name
+            except (BagError, OSError, ValueError, KeyError, StopIteration):
+                continue  # not one of rosidl
+    return ''

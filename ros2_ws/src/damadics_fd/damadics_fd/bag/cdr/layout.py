@@ -20,7 +20,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from damadics_fd.bag.cdr.definition import PRIMITIVES, Definition, parse_definition, schema_text
+from damadics_fd.bag.cdr.definition import (
+    DEEPEST,
+    PRIMITIVES,
+    Definition,
+    parse_definition,
+    schema_text,
+)
 from damadics_fd.bag.errors import BagError
 
 HEADER = b'\x00\x01\x00\x00'  # plain CDR, little endian
@@ -32,7 +38,11 @@ NANO = 1_000_000_000
 
 
 class Place(NamedTuple):
-    """Where a field lies: `repeat` None is one value, otherwise an array; `text`: a string."""
+    """
+    Where a field lies: `repeat` None is one value, otherwise an array.
+
+    `text`: a string of `repeat` bytes, or a wstring of `repeat` words, each a unit of UTF-16.
+    """
 
     name: str
     dtype: str
@@ -65,7 +75,7 @@ class Layout:
         """
         kinds = [
             f'S{place.repeat}'
-            if place.text
+            if place.dtype == 'S'
             else (
                 self.order + place.dtype
                 if place.repeat is None
@@ -130,12 +140,16 @@ class _Walk:
         self.lengths.append((offset, length))
         return int(length)
 
-    def walk(self, kind: str, prefix: str = '') -> None:
+    def walk(self, kind: str, prefix: str = '', depth: int = 0) -> None:
         """Add the places of one message."""
+        if depth > DEEPEST:
+            raise BagError(f'{kind} is nested more than {DEEPEST} deep, perhaps in itself')
+        if not self.definition[kind] and (depth or self.at < len(self.data)):
+            self._reserve(1)  # a struct needs a member in IDL: rosidl gives it an uint8
         for member in self.definition[kind]:
             name = prefix + member.name
             if member.repeat is None:
-                self._one(name, member.type)
+                self._one(name, member.type, depth)
                 continue
             if member.repeat < 0 and self.texts is not None:
                 raise BagError(f'{name} is a sequence; only messages of fixed size can be encoded')
@@ -148,14 +162,14 @@ class _Walk:
                 self.places.append(Place(name, code, offset, count))
             else:
                 for i in range(count):
-                    self._one(f'{name}.{i}', member.type)
+                    self._one(f'{name}.{i}', member.type, depth)
 
     def _spend(self, steps: int) -> None:
         self.steps += steps
         if self.steps > MOST_ELEMENTS:
             raise BagError(f'a message has more than {MOST_ELEMENTS} elements')
 
-    def _one(self, name: str, kind: str) -> None:
+    def _one(self, name: str, kind: str, depth: int) -> None:
         self._spend(1)
         if kind in PRIMITIVES:
             code = PRIMITIVES[kind]
@@ -166,9 +180,12 @@ class _Walk:
             offset = self._reserve(length)
             self.places.append(Place(name, 'S', offset, max(length - 1, 0), text=True))
         elif kind == 'wstring':
-            raise BagError(f'{name} is a wstring, which cannot be read')
+            if self.texts is not None:
+                raise BagError(f'{name} is a wstring; only string can be encoded')
+            count = self._length(name)  # of UTF-16 units; each takes four bytes
+            self.places.append(Place(name, 'u4', self._reserve(4 * count), count, text=True))
         else:
-            self.walk(kind, name + '.')
+            self.walk(kind, name + '.', depth + 1)
 
     def layout(self) -> Layout:
         """Return what was collected."""

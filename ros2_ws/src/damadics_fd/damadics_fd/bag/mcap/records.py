@@ -10,8 +10,12 @@ Message records.
 """
 
 import struct
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
 
 from damadics_fd.bag.errors import BagError
 
@@ -68,6 +72,26 @@ class Channel:
     metadata: dict[str, str] = field(default_factory=dict)
 
 
+class Extent(NamedTuple):
+    """A whole record in a file: its place and its length with head [B]."""
+
+    op: Op
+    at: int
+    length: int
+
+
+class Attachment(NamedTuple):
+    """What an Attachment record says: times [ns], size of the fields before the CRC."""
+
+    log_time: int
+    create_time: int
+    name: str
+    media_type: str
+    data_size: int
+    size: int
+    crc: int
+
+
 @dataclass(frozen=True, slots=True)
 class ChunkHead:
     """What a Chunk record says before its compressed records."""
@@ -77,6 +101,26 @@ class ChunkHead:
     size: int
     crc: int
     compression: str
+
+
+def message_dtype(size: int) -> np.dtype:
+    """
+    Describe a Message record whose data has a fixed size.
+
+    :param size: size of the data [B].
+    :return: packed structured type with the fields of the record.
+    """
+    return np.dtype(
+        [
+            ('op', 'u1'),
+            ('length', '<u8'),
+            ('channel', '<u2'),
+            ('sequence', '<u4'),
+            ('log_time', '<u8'),
+            ('publish_time', '<u8'),
+            ('data', f'V{size}'),
+        ]
+    )
 
 
 def record(op: int, *parts: bytes) -> bytes:
@@ -169,6 +213,8 @@ class Fields:
 _U16 = struct.Struct('<H')
 _U16_2 = struct.Struct('<HH')
 _U64 = struct.Struct('<Q')
+_U64_2 = struct.Struct('<QQ')
+_NAMES = 1 << 16  # [B] that name and media type of an attachment may take
 
 
 def parse_schema(content: bytes | memoryview) -> Schema:
@@ -191,12 +237,33 @@ def parse_chunk(content: bytes | memoryview) -> tuple[ChunkHead, memoryview]:
     start, end, size, crc = fields.unpack(CHUNK)
     compression = fields.string()
     (length,) = fields.unpack(_U64)
-    if length != fields.left:
+    if length > fields.left:
         raise BagError('the CHUNK record is damaged')
-    return ChunkHead(start, end, size, crc, compression), fields.rest()
+    return ChunkHead(start, end, size, crc, compression), fields.take(length)
 
 
 def parse_metadata(content: bytes | memoryview) -> tuple[str, dict[str, str]]:
     """Decode a Metadata record into its name and entries."""
     fields = Fields(content)
     return fields.string(), fields.string_map()
+
+
+def parse_attachment(read: Callable[[int, int], bytes], at: int) -> Attachment:
+    """
+    Read what an Attachment record says, but not its data.
+
+    :param read: reads bytes of the file: place, size.
+    :param at: place of the record.
+    :raises BagError: where the record is damaged.
+    """
+    _, length = HEAD.unpack(read(at, HEAD.size))
+    begin = at + HEAD.size
+    fields = Fields(read(begin, min(length, _NAMES)))
+    log_time, create_time = fields.unpack(_U64_2)
+    name, media_type = fields.string(), fields.string()
+    (data_size,) = fields.unpack(_U64)
+    size = 16 + 4 + len(name.encode()) + 4 + len(media_type.encode()) + 8 + data_size
+    if size + 4 > length:
+        raise BagError('the ATTACHMENT record is damaged')
+    crc = int.from_bytes(read(begin + size, 4), 'little')
+    return Attachment(log_time, create_time, name, media_type, data_size, size, crc)

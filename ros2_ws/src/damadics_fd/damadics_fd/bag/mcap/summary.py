@@ -2,8 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The summary at the end of a finished MCAP file."""
 
+import struct
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,6 +18,7 @@ from damadics_fd.bag.mcap.records import (
     FOOTER_SIZE,
     HEAD,
     MAGIC,
+    STATISTICS,
     Channel,
     Fields,
     Op,
@@ -26,7 +29,17 @@ from damadics_fd.bag.mcap.records import (
 
 TAIL = 1 << 22  # [B] searched where bytes were lost or added before the summary
 _DATA_END = HEAD.pack(Op.DATA_END, 4)
+_PLACE = struct.Struct('<QQ')
 Read = Callable[[int, int], bytes]  # place, size
+
+
+class Indexed(NamedTuple):
+    """What the index says about a chunk: times [ns], length of its record [B]."""
+
+    start: int
+    end: int
+    length: int
+    messages: dict[int, int]  # places of the message indexes by channel
 
 
 @dataclass
@@ -35,18 +48,26 @@ class Summary:
     What the end of a file says about it.
 
     :param counts: messages by channel.
-    :param chunks: by the place of each chunk the places of its message indexes.
-    :param lengths: by the place of each chunk the length of its record [B].
+    :param messages: all of them, -1 where it is not said.
+    :param chunks: by the place of each chunk what the index says about it.
+    :param attachments: places and lengths of the attachments.
+    :param metadata: places and lengths of the metadata.
+    :param records: numbers of attachments, metadata and chunks, none where it is not said.
     :param present: it was there and its CRC was right.
+    :param absent: the file is finished and says that it has none.
     :param moved: bytes are missing or were added before it, so that no place in it is right.
     """
 
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
     counts: dict[int, int] = field(default_factory=dict)
-    chunks: dict[int, dict[int, int]] = field(default_factory=dict)
-    lengths: dict[int, int] = field(default_factory=dict)
+    messages: int = -1
+    chunks: dict[int, Indexed] = field(default_factory=dict)
+    attachments: dict[int, int] = field(default_factory=dict)
+    metadata: dict[int, int] = field(default_factory=dict)
+    records: tuple[int, int, int] | None = None
     present: bool = False
+    absent: bool = False
     moved: bool = False
 
 
@@ -65,8 +86,12 @@ def read_summary(read: Read, size: int, limits: Limits) -> Summary:
         return Summary()
     op, length = HEAD.unpack_from(tail)
     stated, _, crc = FOOTER.unpack_from(tail, HEAD.size)
-    if op != Op.FOOTER or length != FOOTER.size or not stated:
+    if op != Op.FOOTER or length != FOOTER.size:
         return Summary()
+    if not stated:
+        before = read(max(0, end - len(_DATA_END) - 4), len(_DATA_END))
+        good = not crc or crc32(tail[: FOOTER_SIZE - 4]) == crc
+        return Summary(absent=good and before == _DATA_END)
     for start in _starts(read, stated, end, limits):
         data = read(start, end - start + FOOTER_SIZE - 4)
         if crc32(data) == crc or (crc == 0 and start == stated):
@@ -90,27 +115,40 @@ def _starts(read: Read, stated: int, end: int, limits: Limits) -> Iterator[int]:
         yield first + at + len(_DATA_END) + 4
 
 
+def _pairs(data: bytes) -> dict[int, int]:
+    return dict(np.frombuffer(data, '<u2,<u8').tolist())
+
+
 def _parse(data: memoryview) -> Summary:
     summary = Summary()
     at = 0
     while at < len(data):
-        fields = Fields(data[at:])
+        fields = Fields(data[at : at + HEAD.size])
         op, length = fields.unpack(HEAD)
-        content = fields.take(length)
+        content = data[at + HEAD.size : at + HEAD.size + length]
+        if len(content) < length:
+            raise BagError('the summary ends in the middle of a record')
         at += HEAD.size + length
-        if op == Op.SCHEMA:
-            schema = parse_schema(content)
-            summary.schemas[schema.id] = schema
-        elif op == Op.CHANNEL:
-            channel = parse_channel(content)
-            summary.channels[channel.id] = channel
-        elif op == Op.CHUNK_INDEX:
-            index = Fields(content)
-            _, _, offset, summary.lengths[offset] = index.unpack(CHUNK_INDEX)
-            entries = np.frombuffer(index.bytes_(), '<u2,<u8')
-            summary.chunks[offset] = dict(entries.tolist())
-        elif op == Op.STATISTICS:
-            counts = Fields(content[46:])
-            pairs = np.frombuffer(counts.rest(), '<u2,<u8')
-            summary.counts = dict(pairs.tolist())
+        _note(summary, op, content)
     return summary
+
+
+def _note(summary: Summary, op: int, content: memoryview) -> None:
+    fields = Fields(content)
+    if op == Op.SCHEMA:
+        schema = parse_schema(content)
+        summary.schemas[schema.id] = schema
+    elif op == Op.CHANNEL:
+        channel = parse_channel(content)
+        summary.channels[channel.id] = channel
+    elif op == Op.CHUNK_INDEX:
+        start, end, offset, length = fields.unpack(CHUNK_INDEX)
+        summary.chunks[offset] = Indexed(start, end, length, _pairs(fields.bytes_()))
+    elif op == Op.STATISTICS:
+        summary.messages, _, _, *records, _, _ = fields.unpack(STATISTICS)
+        summary.records = (records[0], records[1], records[2])
+        summary.counts = _pairs(fields.bytes_())
+    elif op in (Op.ATTACHMENT_INDEX, Op.METADATA_INDEX):
+        offset, length = fields.unpack(_PLACE)
+        places = summary.attachments if op == Op.ATTACHMENT_INDEX else summary.metadata
+        places[offset] = length

@@ -16,9 +16,8 @@ from damadics_fd.bag.limits import Limits
 from damadics_fd.bag.mcap.crc import crc32
 from damadics_fd.bag.mcap.records import ChunkHead, parse_chunk
 
-_ZSTD_MAGIC = b'\x28\xb5\x2f\xfd'
+ZSTD_MAGIC = b'\x28\xb5\x2f\xfd'
 _FOREIGN = {
-    b'SQLite f': 'is an SQLite bag; convert it: ros2 bag convert with storage_id mcap',
     b'#ROSBAG ': 'is a ROS 1 bag; convert it: rosbags-convert --dst-storage mcap',
     b'PK\x03\x04': 'is a ZIP archive; unpack it first',
     b'\x1f\x8b': 'is compressed by gzip; unpack it first',
@@ -112,9 +111,9 @@ def open_plain(path: Path, limits: Limits) -> BinaryIO:
         start = stream.read(8)
     except OSError as error:
         raise BagError(f'cannot be read: {error.strerror}', path) from error
-    if start.startswith(_ZSTD_MAGIC):
+    if start.startswith(ZSTD_MAGIC):
         with stream:
-            return _unpacked(stream, path, limits)
+            return unpacked(stream, path, limits)
     foreign = next((text for magic, text in _FOREIGN.items() if start.startswith(magic)), '')
     if foreign or not start:
         stream.close()
@@ -122,19 +121,38 @@ def open_plain(path: Path, limits: Limits) -> BinaryIO:
     return stream
 
 
-def _unpacked(stream: BinaryIO, path: Path, limits: Limits) -> BinaryIO:
+def unpacked(stream: BinaryIO, path: Path, limits: Limits) -> BinaryIO:
+    """
+    Decompress a file that is compressed as a whole into a file without name.
+
+    :param stream: the file, which stays open.
+    :param path: its name.
+    :param limits: what it may ask for.
+    :raises BagError: where it asks for more, or the disk is full.
+    """
+    most = limits.unpacked + limits.unpacked_ratio * os.fstat(stream.fileno()).st_size
     stream.seek(0)
     plain: BinaryIO = tempfile.TemporaryFile()  # type: ignore[assignment]  # noqa: SIM115
     try:
-        with zstandard.ZstdDecompressor().stream_reader(stream, read_across_frames=True) as source:
+        with zstandard.ZstdDecompressor().stream_reader(
+            stream, read_across_frames=True, closefd=False
+        ) as source:
             while block := source.read(1 << 20):
-                if plain.tell() + len(block) > limits.unpacked:
-                    raise BagError('is beyond the size limit when decompressed', path)
+                if plain.tell() + len(block) > most:
+                    raise BagError(
+                        f'is larger than {most} bytes when decompressed; if it is yours,'
+                        ' decompress it first: zstd -d',
+                        path,
+                    )
                 plain.write(block)
+        plain.flush()
     except zstandard.ZstdError:
         pass  # the reader reports where it ends
+    except OSError as error:
+        plain.close()
+        raise BagError(f'cannot be decompressed: {error.strerror}', path) from error
     except BaseException:
         plain.close()
         raise
-    plain.flush()
+    plain.seek(0)
     return plain

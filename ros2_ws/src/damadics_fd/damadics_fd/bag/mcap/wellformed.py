@@ -22,10 +22,14 @@ _SHAPES: dict[Op, tuple[int, ...]] = {  # sizes of the fields in order
     Op.DATA_END: (4,),
 }
 
+_FIXED = (Op.FOOTER, Op.DATA_END)  # never to be extended
+
 
 def well_formed(op: Op, content: bytes, length: int) -> bool:
     """
-    Tell whether the fields of a record fill it exactly.
+    Tell whether a record has room for its fields.
+
+    There may be more behind them: later versions of MCAP add fields at the end.
 
     :param op: its opcode.
     :param content: the beginning of its content; what lies beyond is not judged.
@@ -48,4 +52,4 @@ def well_formed(op: Op, content: bytes, length: int) -> bool:
             at += prefix + int.from_bytes(content[at : at + prefix], 'little')
         else:
             at += size
-    return at == length
+    return at == length if op in _FIXED else at <= length

@@ -4,13 +4,14 @@
 
 import struct
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, Protocol
 
 import numpy as np
 import zstandard
 from numpy.typing import NDArray
 
+from damadics_fd.bag.grouping import grouped
 from damadics_fd.bag.mcap.crc import crc32
 from damadics_fd.bag.mcap.records import (
     CHUNK,
@@ -20,10 +21,12 @@ from damadics_fd.bag.mcap.records import (
     MAGIC,
     MESSAGE,
     STATISTICS,
+    Attachment,
     Channel,
     Op,
     Schema,
     channel_record,
+    message_dtype,
     record,
     schema_record,
     string,
@@ -43,26 +46,6 @@ class Sink(Protocol):
 
     def flush(self) -> None:
         """Hand what is buffered to the operating system."""
-
-
-def message_dtype(size: int) -> np.dtype:
-    """
-    Describe a Message record whose data has a fixed size.
-
-    :param size: size of the data [B].
-    :return: packed structured type with the fields of the record.
-    """
-    return np.dtype(
-        [
-            ('op', 'u1'),
-            ('length', '<u8'),
-            ('channel', '<u2'),
-            ('sequence', '<u4'),
-            ('log_time', '<u8'),
-            ('publish_time', '<u8'),
-            ('data', f'V{size}'),
-        ]
-    )
 
 
 class McapWriter:
@@ -96,6 +79,7 @@ class McapWriter:
         self._channels: list[Channel] = []
         self._counts: dict[int, int] = {}
         self._chunk_index: list[bytes] = []
+        self._attachment_index: list[bytes] = []
         self._metadata_index: list[bytes] = []
         self._times: tuple[int, int] | None = None
         self._crc = 0  # of the data section
@@ -223,12 +207,10 @@ class McapWriter:
         :param offsets: place of each in `data` [B].
         """
         self.end_chunk()
-        for channel in np.unique(channels).tolist():
-            rows = channels == channel
+        for channel, rows in grouped(channels):
             entries = [log_times[rows].astype('<u8'), offsets[rows].astype('<u8')]
-            pairs = np.stack(entries, axis=1)
-            self._index[channel] = [pairs.tobytes()]
-            self._counts[channel] += len(pairs)
+            self._index[channel] = [np.stack(entries, axis=1).tobytes()]
+            self._counts[channel] += len(rows)
         self._parts, self._size = [data], len(data)
         self._log_times = [int(log_times.min()), int(log_times.max())]
         self.end_chunk()
@@ -282,12 +264,36 @@ class McapWriter:
 
     def add_metadata(self, name: str, entries: dict[str, str]) -> None:
         """Write a Metadata record."""
-        self.end_chunk()
         data = record(Op.METADATA, string(name), string_map(entries))
-        self._metadata_index.append(
-            record(Op.METADATA_INDEX, struct.pack('<QQ', self.position, len(data)), string(name))
-        )
+        self.put_metadata(name, data)
+
+    def put_metadata(self, name: str, data: bytes) -> None:
+        """Write a Metadata record that is encoded already."""
+        self.end_chunk()
+        place = struct.pack('<QQ', self.position, len(data))
+        self._metadata_index.append(record(Op.METADATA_INDEX, place, string(name)))
         self._write(data)
+
+    def put_attachment(self, about: Attachment, length: int, blocks: Iterable[bytes]) -> None:
+        """
+        Write an Attachment record that is encoded already.
+
+        :param about: what it says.
+        :param length: its length with head [B].
+        :param blocks: its bytes, piece by piece.
+        """
+        self.end_chunk()
+        numbers = (self.position, length, about.log_time, about.create_time, about.data_size)
+        self._attachment_index.append(
+            record(
+                Op.ATTACHMENT_INDEX,
+                struct.pack('<QQQQQ', *numbers),
+                string(about.name),
+                string(about.media_type),
+            )
+        )
+        for block in blocks:
+            self._write(block)
 
     def finish(self) -> None:
         """Write the summary and the footer; the stream stays open."""
@@ -299,7 +305,7 @@ class McapWriter:
             self.message_count,
             len(self._schemas),
             len(self._channels),
-            0,
+            len(self._attachment_index),
             len(self._metadata_index),
             len(self._chunk_index),
             start,
@@ -310,6 +316,7 @@ class McapWriter:
             Op.CHANNEL: [channel_record(channel) for channel in self._channels],
             Op.STATISTICS: [record(Op.STATISTICS, statistics, string(counts))],
             Op.CHUNK_INDEX: self._chunk_index,
+            Op.ATTACHMENT_INDEX: self._attachment_index,
             Op.METADATA_INDEX: self._metadata_index,
         }
         summary = b''

@@ -1,0 +1,84 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""What only a thorough reading of an MCAP file finds: indexes, attachments, statistics."""
+
+import struct
+from collections.abc import Callable
+
+import numpy as np
+
+from damadics_fd.bag.errors import BagError
+from damadics_fd.bag.mcap.records import HEAD, Extent, Op, parse_attachment
+from damadics_fd.bag.mcap.summary import Indexed, Summary
+from damadics_fd.bag.messages import MESSAGE_HEAD, Batch
+
+Read = Callable[[int, int], bytes]  # place, size
+Crc = Callable[[int, int], int]  # place, size
+Tell = Callable[[int, str], None]  # place, what is wrong there
+
+
+def check_message_index(read: Read, tell: Tell, indexed: Indexed, batch: Batch) -> None:
+    """
+    Compare the message indexes of a chunk with its messages.
+
+    :param read: reads bytes of the file.
+    :param tell: told what does not match.
+    :param indexed: what the chunk index says.
+    :param batch: the messages.
+    """
+    if not indexed.messages:
+        return
+    parts = dict(batch.by_channel())
+    for number in parts.keys() - indexed.messages.keys():
+        tell(batch.offset, f'the messages of channel {number} are missing in the message index')
+    none = np.empty(0, np.int64)
+    for number, at in indexed.messages.items():
+        rows = parts.get(number, none)
+        places = batch.starts[rows] - MESSAGE_HEAD
+        pairs = np.stack([batch.log_times(rows), places], axis=1).astype('<u8')
+        content = struct.pack('<HI', number, pairs.nbytes)
+        found = read(at, HEAD.size + len(content) + pairs.nbytes)
+        op, length = HEAD.unpack_from(found) if len(found) >= HEAD.size else (0, 0)
+        same = op == Op.MESSAGE_INDEX and length >= len(content) + pairs.nbytes
+        same = same and found[HEAD.size : HEAD.size + 6] == content
+        if same:  # the entries may be in any order
+            listed = np.frombuffer(found[HEAD.size + 6 :], '<u8').reshape(-1, 2)
+            listed = listed[np.argsort(listed[:, 1])]
+            same = bool((listed == pairs).all())
+        if not same:
+            tell(at, 'the message index does not match the chunk')
+
+
+def check_extras(
+    read: Read, crc: Crc, tell: Tell, summary: Summary, extras: list[Extent], end: int
+) -> None:
+    """
+    Check attachments and metadata: CRC, index and number.
+
+    :param read: reads bytes of the file.
+    :param crc: computes the CRC of bytes of the file.
+    :param tell: told what does not match.
+    :param summary: what the end of the file says.
+    :param extras: those that are there.
+    :param end: place of the end of the data section.
+    """
+    for op, at, _ in extras:
+        if op != Op.ATTACHMENT:
+            continue
+        try:
+            attachment = parse_attachment(read, at)
+        except BagError as error:
+            tell(at, error.reason)
+            continue
+        if attachment.crc and crc(at + HEAD.size, attachment.size) != attachment.crc:
+            tell(at, 'an attachment is damaged: its CRC does not match')
+    places = {Op.ATTACHMENT: summary.attachments, Op.METADATA: summary.metadata}
+    for op, listed in places.items():
+        there = {extra.at: extra.length for extra in extras if extra.op == op}
+        if listed and listed != there and not summary.moved:
+            tell(end, f'the index of the {op.name.lower()} records does not match them')
+        if summary.records:
+            stated = summary.records[0 if op == Op.ATTACHMENT else 1]
+            if stated != len(there):
+                name = op.name.lower()
+                tell(end, f'{len(there)} {name} records are there, the statistics say {stated}')
