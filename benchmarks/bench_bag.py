@@ -25,20 +25,20 @@ from pathlib import Path
 import numpy as np
 from damadics_fd.bag import BagWriter, iter_columns, loading, read_columns, write_columns
 from damadics_fd.bag.rosbag2 import qos
+from damadics_fd.core.sample import COLUMNS
 from damadics_plant import simulate
 from numpy.typing import NDArray
 
 SLOW_ROWS = 40_000  # read by the peers
 ROWS = 400_000
 RATE = 200.0  # [Hz]
-SIGNALS = ('stamp', 'cv', 'x1', 'p1', 'p2', 't1', 'flow', 'ps')
 MEASUREMENT = 'damadics_msgs/msg/Measurement'
 
 
 def recording(n: int) -> dict[str, np.ndarray]:
     """Return the measurements of a simulated healthy valve with noisy sensors at 200 Hz."""
     run = simulate('nominal', RATE, 'lugre', noise=True, duration=n / RATE)
-    return {name: run[name][:n] for name in SIGNALS}
+    return {name: run[name][:n] for name in COLUMNS}
 
 
 def spent(task: Callable[[], object], repeats: int) -> NDArray[np.float64]:

@@ -21,9 +21,8 @@ import numpy as np
 from damadics_fd.core.approximator.estimator import Estimator
 from damadics_fd.core.decision.detector import Detector
 from damadics_fd.core.pipeline import run
+from damadics_fd.core.sample import COLUMNS
 from damadics_fd.core.settings import Settings
-
-NAMES = ('stamp', 'cv', 'x1', 'p1', 'p2', 't1', 'flow', 'ps')
 
 
 def recording(n: int, rate: float) -> dict[str, np.ndarray]:
@@ -105,7 +104,7 @@ def main() -> None:
             for piece in pieces:
                 run(piece, settings, estimator, detector)
 
-        rows = list(zip(*(columns[key][:few].tolist() for key in NAMES), strict=True))
+        rows = list(zip(*(columns[key][:few].tolist() for key in COLUMNS), strict=True))
 
         def calls(settings: Settings = settings, rows: list = rows) -> None:
             estimator, detector = Estimator(settings), Detector(settings)

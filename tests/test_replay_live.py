@@ -11,10 +11,10 @@ import pytest
 import rclpy
 from damadics_bringup.processes import Processes, free_domain, parameters, surroundings
 from damadics_fd.bag import read_columns, write_columns
-from damadics_fd.bag.recording import SIGNALS
 from damadics_fd.commands.replay.replay import main as replay
 from damadics_fd.core.decision.alarm import RAISED
 from damadics_fd.core.pipeline import run
+from damadics_fd.core.sample import SIGNALS
 from damadics_fd.core.settings import Settings
 from damadics_plant import simulate
 from rclpy.context import Context

@@ -10,6 +10,7 @@ import pytest
 from damadics_bringup.processes import parameters
 from damadics_fd.core.decision.alarm import NE107
 from damadics_fd.core.pipeline import run
+from damadics_fd.core.sample import SIGNALS
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.signature.state import CAUSES, known
 from damadics_fd.ros import qos
@@ -20,7 +21,6 @@ from damadics_plant import simulate
 from diagnostic_msgs.msg import DiagnosticArray
 
 pytestmark = pytest.mark.ros
-SIGNALS = ('cv', 'x1', 'p1', 'p2', 't1', 'flow', 'ps')
 RATE = 100.0  # Hz
 # learning is shortened to what fits into the 70 s before the fault of the scenario
 QUICK = {'mode': 'monitor', 'sample_rate': RATE, 't_learn': 30.0, 'verify': 10.0}

@@ -5,9 +5,9 @@
 from typing import Any
 
 import numpy as np
+from damadics_fd.core.stamps import SECOND as NANO
 from numpy.typing import NDArray
 
-NANO = 1_000_000_000
 Points = list[list[float | None]]
 
 

@@ -7,6 +7,7 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+from damadics_fd.core.stamps import is_date
 from damadics_msgs.msg import FaultEvent, FaultFlag
 
 from damadics_dashboard.raw import Batch
@@ -14,7 +15,6 @@ from damadics_dashboard.traces import NANO, Trace
 
 HEARTBEAT_LOST = 2.0  # s; the detector repeats its flag every second
 SAMPLES_LOST = 0.6  # s, or three periods of the samples
-EPOCH = 100_000_000  # s; smaller stamps count from the start of a scenario
 WINDOW = 600.0  # s that plots may show
 MOST_SAMPLES = 150_000
 NE107 = {
@@ -289,6 +289,6 @@ def moment(stamp: int) -> str:
     if stamp <= 0:
         return '–'
     seconds = stamp / NANO
-    if seconds < EPOCH:
+    if not is_date(stamp):
         return f't = {seconds:.2f} s'
     return time.strftime('%Y-%m-%d %H:%M:%S', time.localtime(seconds))

@@ -10,6 +10,7 @@ from typing import Any
 import rclpy
 from builtin_interfaces.msg import Time
 from damadics_fd.bag.cdr.layout import stamped_encoder
+from damadics_fd.core.sample import SIGNALS
 from damadics_fd.ros import qos
 from damadics_fd.ros.arguments import check_node_arguments
 from damadics_fd.ros.parameters import Parameters
@@ -36,7 +37,7 @@ SETTLE = 0.5  # s from the last awaited subscriber to the first sample, for the 
 AHEAD = 0.05  # s of wall time that is simulated at once; an injected fault begins after it
 MESSAGES = {
     'damadics_msgs/msg/FaultState': ('fault', 'strength'),
-    'damadics_msgs/msg/Measurement': ('cv', 'x1', 'p1', 'p2', 't1', 'flow', 'ps'),
+    'damadics_msgs/msg/Measurement': SIGNALS,
 }
 PATIENCE = 0.5  # s of wall time behind which the pace is given up
 

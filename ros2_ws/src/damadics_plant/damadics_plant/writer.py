@@ -7,8 +7,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
+from damadics_fd.core.sample import SIGNALS
 
-CSV_COLUMNS = ('t', 'cv', 'x1', 'p1', 'p2', 't1', 'flow', 'ps', 'fault', 'strength')
+CSV_COLUMNS = ('t', *SIGNALS, 'fault', 'strength')
 
 BYTES_PER_SAMPLE = 150
 """About the size of a sample in either kind of file."""
@@ -49,7 +50,6 @@ def _mcap(path: Path) -> Iterator[Write]:
     from damadics_fd.bag.rosbag2 import qos
     from damadics_fd.bag.writer import BagWriter
 
-    signals = ('cv', 'x1', 'p1', 'p2', 't1', 'flow', 'ps')
     schema_text('damadics_msgs/msg/Measurement')  # refused before there is a file
     with BagWriter(path) as bag:
         bag.add_topic('/measurement', 'damadics_msgs/msg/Measurement', [qos(depth=1000)])
@@ -59,7 +59,7 @@ def _mcap(path: Path) -> Iterator[Write]:
             bag.write_columns(
                 columns['stamp'],
                 {
-                    '/measurement': {name: columns[name] for name in signals},
+                    '/measurement': {name: columns[name] for name in SIGNALS},
                     '/fault_state': {name: columns[name] for name in ('strength', 'fault')},
                 },
                 'LC74_20',

@@ -21,20 +21,9 @@ from damadics_fd.bag.tables import Table, read_table
 
 TABLES = ('.csv', '.txt', '.tsv')
 MEASUREMENT = 'damadics_msgs/msg/Measurement'
-EPOCH = 10**17  # [ns] stamps from here on are dates, below they count from scenario zero
-__all__ = ['SIGNALS', 'Recording', 'find_recordings', 'origin', 'parse_maps']
+__all__ = ['SIGNALS', 'Recording', 'find_recordings', 'parse_maps']
 _ELEMENT = re.compile(r'\[(\d+)\]$')  # of an array
 Told = Callable[[str], None]
-
-
-def origin(stamp: int) -> int:
-    """
-    Return the stamp that counts as time zero [ns].
-
-    :param stamp: first stamp of a recording [ns].
-    :return: 0 for simulations, which count from scenario zero; the first stamp for real data.
-    """
-    return stamp if abs(stamp) >= EPOCH else 0
 
 
 @dataclass(frozen=True)

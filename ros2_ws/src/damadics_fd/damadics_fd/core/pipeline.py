@@ -18,7 +18,8 @@ from damadics_fd.core.decision.detector import Decision, Detector
 from damadics_fd.core.decision.events import Event, events_of
 from damadics_fd.core.decision.judge import DECISION
 from damadics_fd.core.jit import jit
-from damadics_fd.core.quality import REASONS, SIGNALS
+from damadics_fd.core.quality import REASONS
+from damadics_fd.core.sample import SIGNALS
 from damadics_fd.core.scada.estimator import ScadaEstimator, estimator_for
 from damadics_fd.core.settings import Settings
 

@@ -27,7 +27,6 @@ REMEDIES = {
     'duplicate': 'let one driver only send, each sample once',
     'out_of_order': 'let one driver only send, in order of time',
 }
-SIGNALS = ('cv', 'x1', 'p1', 'p2', 't1', 'flow', 'ps')
 
 DTYPE = np.dtype(
     (

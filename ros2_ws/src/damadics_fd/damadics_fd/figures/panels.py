@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from damadics_fd.core.modes import PHASE_MONITOR, PHASE_PAPER
 from damadics_fd.core.pipeline import Result
+from damadics_fd.core.stamps import origin
 
 POINTS = 3000  # per curve: more than a page can show
 BLUE, ORANGE, RED, GREEN, GREY = '#1f6fb4', '#e07b00', '#c8102e', '#2e8b57', '#8a8f98'
@@ -109,8 +110,7 @@ def six_panels(
     except ImportError as error:
         raise RuntimeError('figures need matplotlib: pip install matplotlib') from error
     stamp = np.asarray(columns['stamp'])
-    # simulations count from scenario zero, plants from 1970
-    zero = 0 if len(stamp) and abs(int(stamp[0])) < 10**14 else int(stamp[0]) if len(stamp) else 0
+    zero = origin(int(stamp[0])) if len(stamp) else 0
     t = (stamp - zero) * 1e-9
     with rc_context(STYLE):
         layout = ConstrainedLayoutEngine(w_pad=0.08, h_pad=0.07, hspace=0.04, wspace=0.03)

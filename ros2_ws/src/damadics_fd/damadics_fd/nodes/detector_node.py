@@ -16,6 +16,7 @@ from damadics_fd.core.approximator.estimator import Estimate
 from damadics_fd.core.decision.alarm import NE107
 from damadics_fd.core.decision.detector import Decision, Detector, Outcome
 from damadics_fd.core.modes import PHASE_INIT, PHASE_MONITOR
+from damadics_fd.core.stamps import another_run
 from damadics_fd.nodes.managed import MonitoringNode
 from damadics_fd.nodes.operator import OperatorServices
 from damadics_fd.nodes.second_publisher import RivalWatch
@@ -25,7 +26,7 @@ from damadics_fd.ros.arguments import check_node_arguments
 from damadics_fd.ros.conversions import event_message, read_estimate, write_flag
 from damadics_fd.ros.diagnostics import Level, Report
 from damadics_fd.ros.spin import spin
-from damadics_fd.store.alarms import AlarmStore, another_run, default_folder
+from damadics_fd.store.alarms import AlarmStore, default_folder
 
 DESCRIPTION = 'Judge the estimates of one valve: residual against threshold, fault flag, cause.'
 EXAMPLES = """examples:

@@ -15,9 +15,9 @@ from damadics_fd.causes import CauseTable, CauseTableError, load_causes
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.signature.cause import own_alarm_ready
 from damadics_fd.core.signature.signature import Signature
+from damadics_fd.core.stamps import another_run
 from damadics_fd.ros import qos
 from damadics_fd.ros.spin import StartError
-from damadics_fd.store.alarms import another_run
 from damadics_fd.store.references import (
     NoReferenceError,
     Reference,

@@ -9,9 +9,8 @@ from damadics_msgs.msg import FaultEvent, FaultFlag, Measurement
 from damadics_fd.core.approximator.estimator import Estimate
 from damadics_fd.core.decision.detector import Decision
 from damadics_fd.core.decision.events import Event
+from damadics_fd.core.stamps import SECOND
 
-NANO = 1_000_000_000
-MEASURED = ('cv', 'x1', 'p1', 'p2', 't1', 'flow', 'ps')
 SCALARS = tuple(
     name for name in Estimate._fields if name not in ('stamp', 'alpha1', 'alpha4', 'alpha5')
 )
@@ -24,7 +23,7 @@ def nanoseconds(time: Time) -> int:
     :param time: stamp of a message.
     :return: the stamp [ns].
     """
-    return time.sec * NANO + time.nanosec
+    return time.sec * SECOND + time.nanosec
 
 
 def set_stamp(time: Time, stamp: int) -> None:
@@ -34,7 +33,7 @@ def set_stamp(time: Time, stamp: int) -> None:
     :param time: stamp of a message, written.
     :param stamp: the stamp [ns].
     """
-    time.sec, time.nanosec = divmod(stamp, NANO)
+    time.sec, time.nanosec = divmod(stamp, SECOND)
 
 
 def sample(message: Measurement) -> tuple[int, float, float, float, float, float, float, float]:

@@ -10,7 +10,6 @@ from typing import Any
 from damadics_fd.ros.arguments import state_folder
 
 FORMAT = 'damadics_fd alarm 1'
-EPOCH = 10**17  # ns; smaller stamps count from the start of a simulated run
 # what makes an alarm another one; the rest of the state changes with every sample
 MARKS = ('active', 'latched', 'acknowledged', 'occurrence', 'worst', 'shelved_until', 'told')
 
@@ -22,17 +21,6 @@ def default_folder() -> Path:
     :return: a folder of the user.
     """
     return state_folder() / f'domain_{os.environ.get("ROS_DOMAIN_ID", "0")}'
-
-
-def another_run(saved: int, stamp: int) -> bool:
-    """
-    Tell whether a stamp belongs to another simulated run than the saved one.
-
-    :param saved: stamp of the saved state [ns].
-    :param stamp: first stamp after the restart [ns].
-    :return: True where simulated time did not go on; real time always goes on.
-    """
-    return saved < EPOCH and stamp < saved
 
 
 class AlarmStore:

@@ -3,11 +3,9 @@
 """The benchmark's disturbances (block ADist): white noise and 50 Hz hum on every signal."""
 
 import numpy as np
+from damadics_fd.core.sample import SIGNALS
 
 from damadics_plant.actuator.parameters import RANGES
-
-SIGNALS = ('cv', 'x1', 'p1', 'p2', 't1', 'flow', 'ps')
-"""Disturbed signals, each with a random stream of its own."""
 
 WHITE = np.sqrt(5e-9 / 0.0025)
 """Standard deviation of the band-limited white noise, share of the range."""

@@ -6,6 +6,7 @@ import csv
 from pathlib import Path
 
 import numpy as np
+from damadics_fd.core.stamps import SECOND, is_date
 
 from damadics_plant.scenarios.sources import Recorded
 
@@ -32,7 +33,7 @@ def read_recorded(path: Path, column: str, scale: float = 1.0, hold: bool = Fals
         raise ValueError(f'{path}: column {column} has no numbers')
     if np.any(np.diff(times) <= 0):
         raise ValueError(f'{path}: times do not increase')
-    if times[0] >= 1e8:  # a date, not seconds of a scenario
+    if is_date(int(times[0] * SECOND)):
         times = times - times[0]
     return Recorded(times, values, interpolate=not hold)
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from damadics_fd.bag.cdr.decoder import Columns
 from damadics_fd.bag.errors import BagError
-from damadics_fd.bag.recording import Recording, origin
+from damadics_fd.bag.recording import Recording
 from damadics_fd.causes import load_causes
 from damadics_fd.commands.replay.flags import FlagWriter
 from damadics_fd.core.decision.alarm import RAISED
@@ -21,16 +21,15 @@ from damadics_fd.core.decision.detector import Detector
 from damadics_fd.core.decision.events import Event
 from damadics_fd.core.pipeline import Result, run, watch
 from damadics_fd.core.quality import EXPLANATIONS, REASONS, REMEDIES
+from damadics_fd.core.sample import SIGNALS
 from damadics_fd.core.scada.estimator import estimator_for
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.signature.signature import Signature
 from damadics_fd.core.signature.state import STATE_VERIFY
+from damadics_fd.core.stamps import SECOND, origin
 from damadics_fd.figures.decimation import Thinner
 from damadics_fd.figures.valve_signature import ForceMap, force_over_position
 
-NANO = 1e9
-NAMING_S = (30.0, 300.0, np.inf)  # after an alarm; a later fault must not change the name
-STRIDE = 120  # rows between two attempts of mode scada to name a fault
 JUDGEMENT = ('cause', 'confidence', 'strength', 'spread')
 NEEDED = {
     'paper': ('cv', 'x1'),
@@ -113,14 +112,14 @@ class Chain:
 def evidence(event: Event, zero: int) -> dict[str, Any]:
     """Return a detection with its evidence, fit for JSON."""
     values = {
-        't': (event.stamp - zero) / NANO,
+        't': (event.stamp - zero) / SECOND,
         'stamp': event.stamp,
         'residual': event.residual,
         'threshold': event.threshold,
         'ratio': event.ratio,
         'level': event.level,
         'occurrence': event.occurrence,
-        'onset': (event.onset - zero) / NANO if event.onset else None,
+        'onset': (event.onset - zero) / SECOND if event.onset else None,
         'cause': event.cause,
         'confidence': event.confidence,
         'strength': event.strength,
@@ -230,7 +229,7 @@ def _replay(
             flags.close()
     if first is None or last is None:
         raise BagError('has no measurement: the topic is empty', recording.name)
-    outcome.duration_s = (last - first) / NANO
+    outcome.duration_s = (last - first) / SECOND
     outcome.samples_per_s = outcome.samples / spent
     outcome.refused, outcome.status = chain.refused, chain.status
     _judge_refused(outcome, lacking)
@@ -299,7 +298,6 @@ def _draw(thinner: Thinner, recording: Recording, outcome: Outcome, path: Path) 
 
 def warm_up(plans: Sequence[Plan]) -> None:
     """Load or compile the loops, so that the first recording is not slower than the next."""
-    names = ('cv', 'x1', 'p1', 'p2', 't1', 'flow', 'ps')
-    columns: Columns = {name: np.array([0.5]) for name in names}
+    columns: Columns = {name: np.array([0.5]) for name in SIGNALS}
     for plan in plans:
         plan.chain().watch({'stamp': np.array([1]), **columns})

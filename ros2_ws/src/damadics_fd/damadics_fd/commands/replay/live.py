@@ -19,10 +19,11 @@ from rosgraph_msgs.msg import Clock
 from tqdm import tqdm
 
 from damadics_fd.bag.cdr.decoder import Columns
-from damadics_fd.bag.recording import SIGNALS, Recording
+from damadics_fd.bag.recording import Recording
 from damadics_fd.causes import load_causes
 from damadics_fd.commands.replay.bags import Plan, joined
 from damadics_fd.core.decision.detector import Detector
+from damadics_fd.core.sample import SIGNALS
 from damadics_fd.core.scada.estimator import estimator_for
 from damadics_fd.core.settings import Settings
 from damadics_fd.ros import qos

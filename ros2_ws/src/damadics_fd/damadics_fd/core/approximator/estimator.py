@@ -20,6 +20,7 @@ from damadics_fd.core.approximator.step import (
     update,
 )
 from damadics_fd.core.modes import PHASE_HOLD, PHASE_MONITOR, PHASE_PAPER, PHASES
+from damadics_fd.core.sample import SIGNALS
 from damadics_fd.core.settings import Settings
 
 STILL = 600.0  # s without motion after which the status says so
@@ -260,5 +261,5 @@ class Estimator:
         if reason in (quality.NOT_FINITE, quality.OUT_OF_RANGE):
             for index, value in enumerate(values):
                 if quality.judge_signal(self._settings, index, value) == reason:
-                    return f'{name}: {quality.SIGNALS[index]} = {value:g}'
+                    return f'{name}: {SIGNALS[index]} = {value:g}'
         return f'{name}: {stamp} ns after {int(self.quality[0].stamp)} ns'
