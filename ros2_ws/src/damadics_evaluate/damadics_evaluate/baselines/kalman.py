@@ -6,7 +6,9 @@ import math
 from typing import Any
 
 import numpy as np
-from damadics_fd.core.scada.actuator import Actuator, nominal_flow, pressure_recovery
+from damadics_fd.core.scada.actuator import nominal_flow
+from damadics_fd.core.valve.parameters import Valve
+from damadics_fd.core.valve.plug import RECOVERY, recovery
 
 from damadics_evaluate.baselines.base import (
     CV,
@@ -20,7 +22,8 @@ from damadics_evaluate.baselines.base import (
     require,
 )
 
-ACT = Actuator()
+ACT = Valve()
+KM = np.array(RECOVERY)
 
 
 class InnovationEkf(Detector):
@@ -103,14 +106,14 @@ class FrictionSpringEkf:
         self.dt = dt
         self.v_s = v_s
         self.drift = drift
-        self._g = ACT.spring / ACT.viscous
+        self._g = ACT.stiffness / ACT.viscous
 
     def force(self, columns: dict[str, Floats]) -> Floats:
         """Return u / (K L) from the measured chamber pressure, pressures and position."""
-        plug = np.array([pressure_recovery(x) for x in columns['x1']])
-        drop = (columns['p1'] - columns['p2']) * ACT.plug_area / plug
-        force = ACT.weight + ACT.area * columns['ps'] - drop
-        return np.asarray(force / (ACT.spring * ACT.stroke))
+        plug = np.array([recovery(KM, x) for x in columns['x1']])
+        drop = (columns['p1'] - columns['p2']) * ACT.signed_plug_area / plug
+        force = ACT.mass * ACT.gravity + ACT.area * columns['ps'] - drop
+        return np.asarray(force / ACT.force_scale)
 
     def estimates(self, columns: dict[str, Floats], sigma: float) -> Floats:
         """

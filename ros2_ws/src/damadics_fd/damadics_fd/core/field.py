@@ -1,12 +1,32 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""A setting: a dataclass field with unit, range, description and the default of each mode."""
+"""A setting: a dataclass field with unit, range, description, default and readers of each mode."""
 
-from dataclasses import Field, field
-from typing import Any
+from collections.abc import Iterator
+from dataclasses import Field, dataclass, field, fields
+from typing import ClassVar
+
+import numpy as np
+
+from damadics_fd.core.modes import MODES
+from damadics_fd.core.record import Array
+
+KINDS: dict[type, str] = {bool: '?', int: 'i8', float: 'f8', tuple: 'f8'}
+Value = str | bool | int | float | tuple[float, ...]
+APPROXIMATOR = ('paper', 'monitor')  # the modes with the on-line approximator
 
 
-def number(unit: str, text: str, low: float, high: float, paper: Any, monitor: Any) -> Any:
+def number(
+    unit: str,
+    text: str,
+    low: float,
+    high: float,
+    default: float,
+    *,
+    paper: float | None = None,
+    scada: float | None = None,
+    modes: tuple[str, ...] = MODES,
+) -> float:
     """
     Declare a number.
 
@@ -14,53 +34,180 @@ def number(unit: str, text: str, low: float, high: float, paper: Any, monitor: A
     :param text: what it is.
     :param low: least value allowed.
     :param high: greatest value allowed.
+    :param default: in mode monitor, and in every other mode for which none is given.
     :param paper: default in mode paper.
-    :param monitor: default in mode monitor.
+    :param scada: default in mode scada.
+    :param modes: the modes that read it.
     :return: the field.
     """
-    meta = {
-        'unit': unit,
-        'description': text,
-        'low': low,
-        'high': high,
-        'default': {'paper': paper, 'monitor': monitor},
-    }
-    return field(default=monitor, metadata=meta)
+    meta = _meta(text, _defaults(default, paper, scada), modes, unit, low=low, high=high)
+    return field(default=default, metadata=meta)
 
 
-def choice(text: str, options: tuple[str, ...], paper: str, monitor: str) -> Any:
+def whole(
+    unit: str,
+    text: str,
+    low: int,
+    high: int,
+    default: int,
+    *,
+    scada: int | None = None,
+    modes: tuple[str, ...] = MODES,
+) -> int:
+    """
+    Declare a whole number.
+
+    :param unit: as for `number`, like all that follow.
+    :return: the field.
+    """
+    meta = _meta(text, _defaults(default, None, scada), modes, unit, low=low, high=high)
+    return field(default=default, metadata=meta)
+
+
+def choice(
+    text: str,
+    options: tuple[str, ...],
+    default: str,
+    *,
+    paper: str | None = None,
+    modes: tuple[str, ...] = MODES,
+) -> str:
     """
     Declare a choice.
 
     :param text: what it is.
     :param options: the values allowed.
+    :param default: in all modes but paper where that differs.
     :param paper: default in mode paper.
-    :param monitor: default in mode monitor.
+    :param modes: the modes that read it.
     :return: the field.
     """
-    meta = {
-        'unit': '',
-        'description': text,
-        'choices': options,
-        'default': {'paper': paper, 'monitor': monitor},
-    }
-    return field(default=monitor, metadata=meta)
+    meta = _meta(text, _defaults(default, paper), modes, choices=options)
+    return field(default=default, metadata=meta)
 
 
-def switch(text: str, paper: bool, monitor: bool) -> Any:
+def switch(
+    text: str, default: bool, *, paper: bool | None = None, modes: tuple[str, ...] = MODES
+) -> bool:
     """
     Declare a switch.
 
     :param text: what it is.
+    :param default: in all modes but paper where that differs.
     :param paper: default in mode paper.
-    :param monitor: default in mode monitor.
+    :param modes: the modes that read it.
     :return: the field.
     """
-    meta = {'unit': '', 'description': text, 'default': {'paper': paper, 'monitor': monitor}}
-    return field(default=monitor, metadata=meta)
+    meta = _meta(text, _defaults(default, paper), modes)
+    return field(default=default, metadata=meta)
 
 
-def wrong_choice(name: str, value: Any, options: tuple[str, ...]) -> str:
+def table(
+    unit: str, text: str, low: float, high: float, default: tuple[float, ...]
+) -> tuple[float, ...]:
+    """
+    Declare a list of numbers of fixed length.
+
+    :param unit: of them, '' for none.
+    :param text: what they are.
+    :param low: least value allowed.
+    :param high: greatest value allowed.
+    :param default: in all modes.
+    :return: the field.
+    """
+    meta = _meta(text, _defaults(default), MODES, unit, low=low, high=high)
+    return field(default=default, metadata=meta)
+
+
+Meta = dict[str, str | float | tuple[str, ...] | dict[str, Value]]
+
+
+def _defaults(
+    default: Value, paper: Value | None = None, scada: Value | None = None
+) -> dict[str, Value]:
+    return {
+        'monitor': default,
+        'paper': default if paper is None else paper,
+        'scada': default if scada is None else scada,
+    }
+
+
+def _meta(
+    text: str,
+    defaults: dict[str, Value],
+    modes: tuple[str, ...],
+    unit: str = '',
+    **limits: float | tuple[str, ...],
+) -> Meta:
+    return {'unit': unit, 'description': text, **limits, 'default': defaults, 'modes': modes}
+
+
+class SettingsError(ValueError):
+    """
+    Tell every error of a set of settings at once.
+
+    :param problems: one sentence per error, naming the setting and the remedy.
+    """
+
+    def __init__(self, problems: list[str]) -> None:
+        self.problems = problems
+        super().__init__('; '.join(problems))
+
+
+@dataclass(frozen=True)
+class Section:
+    """
+    Hold settings that belong together; a compiled step reads them from `record()`.
+
+    A compiled step that takes a record of settings states the section, `def step(c: Valve)`.
+    Text is nothing for compiled code: it reads what `DERIVED` names, properties of the section.
+    """
+
+    DERIVED: ClassVar[tuple[str, ...]] = ()
+
+    def __post_init__(self) -> None:
+        """Refuse wrong values; take a whole number where any number is fine."""
+        problems = self.problems()
+        if problems:
+            raise SettingsError(problems)
+        for item in fields(self):
+            value = getattr(self, item.name)
+            if item.type is float:
+                object.__setattr__(self, item.name, float(value))
+            elif isinstance(item.default, tuple):
+                object.__setattr__(self, item.name, tuple(float(v) for v in value))
+
+    def problems(self) -> list[str]:
+        """
+        List every error of the values.
+
+        :return: one sentence per error; empty where all is well.
+        """
+        texts = (problem_of(item, getattr(self, item.name)) for item in fields(self))
+        return list(filter(None, texts))
+
+    def record(self) -> Array:
+        """
+        Return the numbers for the compiled steps.
+
+        :return: structured array of length 1: the numbers, switches, tables and derived numbers.
+        """
+        values = {name: getattr(self, name) for name in self._numbers()}
+        columns = [(name, KINDS[type(value)], np.shape(value)) for name, value in values.items()]
+        array = np.zeros(1, np.dtype((np.record, np.dtype(columns, align=True))))
+        for name, value in values.items():
+            array[name] = value
+        return array
+
+    def _numbers(self) -> Iterator[str]:
+        for item in fields(self):
+            if item.type is not str:
+                yield item.name
+        for kind in reversed(type(self).__mro__):
+            yield from vars(kind).get('DERIVED', ())
+
+
+def wrong_choice(name: str, value: Value, options: tuple[str, ...]) -> str:
     """
     Say that a value is none of the options.
 
@@ -72,7 +219,7 @@ def wrong_choice(name: str, value: Any, options: tuple[str, ...]) -> str:
     return f'{name} = {value!r} is not one of {", ".join(options)}'
 
 
-def problem_of(item: Field, value: Any) -> str:
+def problem_of(item: 'Field[Value]', value: Value) -> str:
     """
     Say what is wrong with a value.
 
@@ -97,13 +244,15 @@ def problem_of(item: Field, value: Any) -> str:
     return ''
 
 
-def _table_problem(item: Field, value: Any) -> str:
-    default: Any = item.default
-    length, low, high = len(default), item.metadata['low'], item.metadata['high']
+def _table_problem(item: 'Field[Value]', value: Value) -> str:
+    length = len(item.metadata['default']['monitor'])
+    low, high = item.metadata['low'], item.metadata['high']
+    if isinstance(value, str | int | float):
+        return f'{item.name} = {value!r} is not a list of numbers'
     try:
-        table = [float(v) for v in value]
+        numbers = [float(v) for v in value]
     except (TypeError, ValueError):
         return f'{item.name} = {value!r} is not a list of numbers'
-    if len(table) != length or not all(low <= v <= high for v in table):
+    if len(numbers) != length or not all(low <= v <= high for v in numbers):
         return f'{item.name} needs {length} numbers in {low:g}..{high:g}'
     return ''

@@ -81,8 +81,8 @@ def signal_fault(c: Any, index: int, value: float) -> int:
     :param value: the signal.
     :return: ACCEPTED, NOT_FINITE or OUT_OF_RANGE.
     """
-    force = c.mode == MONITOR
-    drop = c.mode != PAPER
+    force = c.mode_code == MONITOR
+    drop = c.mode_code != PAPER
     if index <= 1:
         return value_fault(value, c.signal_low, c.signal_high, True)
     if index <= 3:

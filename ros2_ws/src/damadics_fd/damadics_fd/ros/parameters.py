@@ -11,7 +11,7 @@ from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValu
 from rclpy.node import Node
 
 from damadics_fd.core.modes import MODES
-from damadics_fd.core.settings import Settings, SettingsError
+from damadics_fd.core.settings import Settings, SettingsError, unread
 from damadics_fd.ros.spin import StartError
 
 DEFAULT_MODE = 'monitor'
@@ -103,6 +103,17 @@ class Parameters:
             name = self._node.get_name()
             raise StartError('\n  '.join([f'{name} does not start, its parameters:', *problems]))
 
+    def refuse(self, name: str, text: str) -> None:
+        """
+        Refuse a parameter that is not declared, where it is given.
+
+        :param name: name of the parameter.
+        :param text: the whole sentence.
+        """
+        self._names.append(name)
+        if name in self._given():
+            self._problems.append(text)
+
     def _refuse(self, name: str, cause: str, description: str) -> None:
         self._problems.append(f'{name}: {cause} ({description})')
 
@@ -113,7 +124,7 @@ class Parameters:
 
 def declare_settings(parameters: Parameters) -> Settings:
     """
-    Declare every setting of the core as a parameter and read them.
+    Declare every setting that the mode reads as a parameter and read them.
 
     :param parameters: of the node, with its other parameters declared.
     :return: the settings.
@@ -123,6 +134,9 @@ def declare_settings(parameters: Parameters) -> Settings:
     values = {}
     for entry in Settings.describe(mode):
         if entry['name'] == 'mode':
+            continue
+        if mode not in entry['modes']:
+            parameters.refuse(entry['name'], unread(entry['name'], mode))
             continue
         unit = f' [{entry["unit"]}]' if entry['unit'] else ''
         default = entry['default']

@@ -4,7 +4,7 @@
 
 from damadics_fd.core.sample import COLUMNS, TABLE, Sample
 from damadics_msgs.msg import Measurement
-from damadics_plant.parameters import RANGES
+from damadics_plant.actuator.parameters import RANGES
 
 
 def test_the_names_are_those_of_the_message():

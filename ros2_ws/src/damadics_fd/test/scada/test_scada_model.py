@@ -4,16 +4,14 @@
 
 import numpy as np
 import pytest
-from damadics_fd.core.scada.actuator import (
-    Actuator,
-    density,
-    nominal_flow,
-    pressure_recovery,
-    valve_flow,
-)
-from damadics_fd.core.scada.model import FAULTS, STEM, advance_stem, start_stem, transducer
+from damadics_fd.core.scada.actuator import nominal_flow, valve_flow
+from damadics_fd.core.scada.model import FAULTS, STEM, advance_stem, start_stem
+from damadics_fd.core.valve.flow import density
+from damadics_fd.core.valve.parameters import Valve
+from damadics_fd.core.valve.plug import RECOVERY, recovery
+from damadics_fd.core.valve.pneumatics import characteristic
 
-ACT = Actuator().record()
+ACT = Valve().record()
 P1, P2 = 3.5e6, 2.6e6
 DROP = (P1 - P2) / 4e6
 
@@ -75,12 +73,12 @@ def test_water_density():
 def test_pressure_recovery_table():
     table = [(-0.1, 1), (0, 1), (0.1, 0.95), (0.45, 0.755), (0.9, 0.5), (0.99, 0.45), (1.2, 0.4)]
     for x, value in table:
-        assert pressure_recovery(x) == pytest.approx(value)
+        assert recovery(np.array(RECOVERY), x) == pytest.approx(value)
 
 
 def test_transducer_corners():
     for cvi, e in ((-1, -0.55), (-0.94, -0.55), (-0.54, -0.02), (0.46, 0.02), (0.86, 1), (1, 1)):
-        assert transducer(cvi) == pytest.approx(e)
+        assert characteristic(cvi) == pytest.approx(e)
 
 
 def test_faults_move_the_stem_as_the_benchmark_says():

@@ -13,18 +13,18 @@ from typing import Any
 
 import numpy as np
 from damadics_fd.core.jit import jit
-
-from damadics_plant.actuator.measure import measure
-from damadics_plant.actuator.parameters import ATMOSPHERE, Actuator
-from damadics_plant.actuator.physics import (
-    Record,
+from damadics_fd.core.valve.flow import vapour_pressure
+from damadics_fd.core.valve.pneumatics import (
+    ATMOSPHERE,
     air_flow,
     feedback_angle,
-    plug_force,
     set_point_filter,
     transducer,
 )
-from damadics_plant.actuator.valve import vapour_pressure
+
+from damadics_plant.actuator.measure import measure
+from damadics_plant.actuator.parameters import Actuator
+from damadics_plant.actuator.physics import Record, plug_force
 from damadics_plant.faults.effects import update_effects
 
 RATE = 400.0

@@ -13,18 +13,12 @@ from typing import Any
 
 import numpy as np
 from damadics_fd.core.jit import jit
+from damadics_fd.core.valve.flow import vapour_pressure
+from damadics_fd.core.valve.pneumatics import ATMOSPHERE, air_flow, set_point_filter, transducer
 
 from damadics_plant.actuator.measure import measure
-from damadics_plant.actuator.parameters import ATMOSPHERE, LuGreActuator
-from damadics_plant.actuator.physics import (
-    Record,
-    air_flow,
-    plug_force,
-    plug_stiffness,
-    set_point_filter,
-    transducer,
-)
-from damadics_plant.actuator.valve import vapour_pressure
+from damadics_plant.actuator.parameters import LuGreActuator
+from damadics_plant.actuator.physics import Record, plug_force, plug_stiffness
 from damadics_plant.faults.effects import update_effects
 
 RATE = 200.0

@@ -4,9 +4,10 @@
 
 import numpy as np
 from damadics_fd.core.jit import jit
+from damadics_fd.core.valve.flow import density
 
 from damadics_plant.actuator.physics import Record
-from damadics_plant.actuator.valve import compressibility, valve_flow, water_density
+from damadics_plant.actuator.valve import valve_flow
 
 OUTPUTS = ('x1', 'p1', 'p2', 't1', 'flow', 'ps', 'fault', 'strength')
 """Rows of the output of a model, in SI; the last row after them is the true flow [kg/s]."""
@@ -42,8 +43,7 @@ def measure(
     :param out: receives `OUTPUTS` and the true flow; shape (`ROWS`,).
     """
     p = max(p1, pv)
-    density = water_density(t1) / (1.0 - compressibility(t1) * p)
-    flow = valve_flow(xr, p, p2, pv, density, a, e)
+    flow = valve_flow(xr, p, p2, pv, density(t1, p), a, e)
     out[0] = min(max(x * e.position, 0.0), 1.0)
     out[1] = min(max(p1, 0.0), 4e6)
     out[2] = min(max(p2, 0.0), 4e6)

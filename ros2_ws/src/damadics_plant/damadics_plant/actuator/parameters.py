@@ -6,11 +6,14 @@ from dataclasses import dataclass, fields
 from typing import Any, ClassVar
 
 import numpy as np
+from damadics_fd.core.sample import TABLE
+from damadics_fd.core.valve.parameters import Valve
+from damadics_fd.core.valve.pneumatics import AIR_TEMPERATURE, GAS_CONSTANT
 
-ATMOSPHERE = 101325.0
-"""Atmospheric pressure [Pa]; chamber and supply pressures are gauge unless called absolute."""
+VALVE = Valve()
+"""The benchmark's valve as its monitor knows it."""
 
-RANGES = {'cv': 1.0, 'x1': 1.0, 'p1': 4e6, 'p2': 4e6, 't1': 200.0, 'flow': 40.0 / 3.6}
+RANGES = {signal.name: signal.span for signal in TABLE if signal.name != 'ps'}
 """Upper range value of each transmitter in SI (flow in kg/s: 40 t/h); the lower one is 0."""
 
 
@@ -24,47 +27,47 @@ class Actuator:
 
     model: ClassVar[str] = 'dablib'
 
-    stroke: float = 0.0381
+    stroke: float = VALVE.stroke
     """Nominal travel of the plug, X0 [m]."""
-    mass: float = 2.0
+    mass: float = VALVE.mass
     """Moving mass m [kg]."""
-    stiffness: float = 60892.0
+    stiffness: float = VALVE.stiffness
     """Spring and diaphragm constant k [N/m]."""
-    preload: float = 0.009525
+    preload: float = VALVE.preload * VALVE.stroke
     """Initial compression of the spring x0 [m]."""
-    viscous: float = 1500.0
+    viscous: float = VALVE.viscous
     """Viscous friction c [N s/m]."""
-    play: float = 0.01
+    play: float = VALVE.stem_play
     """Width of the play operator, share of the stroke."""
-    area: float = 0.0290
+    area: float = VALVE.area
     """Effective area of the diaphragm Ae [m2]."""
-    dead_volume: float = 0.0055
+    dead_volume: float = VALVE.chamber_volume
     """Volume of the chamber at X = 0, V0 [m3]."""
-    gravity: float = 9.81
+    gravity: float = VALVE.gravity
     """Gravity g [m/s2]."""
-    supply: float = 600e3
+    supply: float = VALVE.supply_pressure
     """Supply pressure Pz [Pa]."""
     supply_minimum: float = 120e3
     """Supply pressure below which the positioner gets none [Pa]."""
-    gas_constant: float = 287.0
+    gas_constant: float = GAS_CONSTANT
     """Specific gas constant of air [J/kg/K]."""
-    air_temperature: float = 293.0
+    air_temperature: float = AIR_TEMPERATURE
     """Temperature of the air [K]; the chamber is isothermal."""
-    air_flow: float = 2.5e-6
+    air_flow: float = VALVE.air_flow
     """Flow factor of the booster at full opening, beta [kg/(s sqrt(Pa))]."""
     leak_flow: float = 2e-7
     """Flow factor of a leak of the chamber at fault strength 1 [kg/(s sqrt(Pa))]."""
-    gain: float = 100.0
+    gain: float = VALVE.positioner_gain
     """Gain of the positioner k_p [1]."""
-    lag: float = 0.30
+    lag: float = VALVE.positioner_lag
     """Each of the two lags of the set-point filter [s]."""
-    hold: float = 0.035
+    hold: float = VALVE.positioner_period
     """Sample time of the positioner [s]."""
-    valve_coefficient: float = 120.0
+    valve_coefficient: float = VALVE.kv
     """K_v of the open valve [m3/h]."""
-    bypass_coefficient: float = 19.75
+    bypass_coefficient: float = VALVE.bypass_kv
     """K_v of the open bypass [m3/h]."""
-    plug_diameter: float = 50.0
+    plug_diameter: float = 1000.0 * VALVE.plug_diameter
     """Diameter of the plug d [mm]."""
 
     def record(self) -> 'np.ndarray[Any, np.dtype[Any]]':

@@ -16,7 +16,7 @@ from damadics_fd.core.modes import (
     PHASE_MONITOR,
     PHASE_PAPER,
 )
-from damadics_fd.core.valve.force import plug_coefficient
+from damadics_fd.core.valve.plug import recovery
 
 STATE = [
     ('elapsed', 'i8'),  # ns since the first sample, gaps that restart the filters left out
@@ -89,7 +89,7 @@ def phase_of(s: Any, c: Any) -> int:
     :param c: settings record.
     :return: a PHASE constant.
     """
-    if c.mode == PAPER:
+    if c.mode_code == PAPER:
         return PHASE_PAPER
     if s.elapsed < s.held_until:
         return PHASE_HOLD
@@ -152,7 +152,7 @@ def progress_of(s: Any, c: Any) -> float:
     :param c: settings record.
     :return: 0..1.
     """
-    if c.mode == PAPER or s.armed:
+    if c.mode_code == PAPER or s.armed:
         return 1.0
     wait = c.t_w / c.t_learn if c.t_learn > 0.0 else 0.0
     done = min(1.0, (s.elapsed - s.start) * 1e-9 / c.t_learn) if c.t_learn > 0.0 else 1.0
@@ -175,7 +175,7 @@ def watch_noise(s: Any, c: Any, dt: float) -> None:
     d = (c.k2 + s.ah1) * s.xi2 + abs(s.phi) * min(max(s.xi2 / c.delta, -1.0), 1.0)
     s.trend += min(dt / TREND, 1.0) * (d - s.trend)
     grow = 1.0 + min(dt / MEDIAN, 1.0)
-    fast = abs(d - s.trend) * plug_coefficient(c, s.x1 - c.preload)
+    fast = abs(d - s.trend) * recovery(c.plug_table, s.x1 - c.spring_origin)
     s.noise = s.noise * grow if fast > s.noise else max(s.noise / grow, LEAST_NOISE)
 
 
@@ -188,7 +188,7 @@ def largest_noise(s: Any, c: Any) -> float:
     :param c: settings record.
     :return: of the disturbance [1/s2].
     """
-    return float(1.4826 * s.noise / plug_coefficient(c, 1.0 - c.gate_high))
+    return float(1.4826 * s.noise / recovery(c.plug_table, 1.0 - c.gate_high))
 
 
 @jit
@@ -228,8 +228,8 @@ def excited(s: Any, c: Any) -> bool:
         s,
         s.ah5 / c.alpha5 - 1.0,
         largest_noise(s, c) / c.alpha5,
-        c.preload + c.gate_low,
-        c.preload + 1.0 - c.gate_high,
+        c.spring_origin + c.gate_low,
+        c.spring_origin + 1.0 - c.gate_high,
     )
     if c.alpha5 * force > alarm:
         s.exceeded = s.elapsed
@@ -264,7 +264,7 @@ def adapt(s: Any, c: Any, phase: int, dt: float, x1: float, x2: float, u: float)
     if phase == PHASE_PAPER:
         observer.adapt_alpha(s, c, dt, x1, u)
         observer.adapt_phi(s, c, dt, x2)
-    elif phase in (PHASE_LEARN_ALPHA, PHASE_LEARN_PHI) and not gated(c, x1 - c.preload):
+    elif phase in (PHASE_LEARN_ALPHA, PHASE_LEARN_PHI) and not gated(c, x1 - c.spring_origin):
         observer.adapt_alpha(s, c, dt, x1, u)
         if phase == PHASE_LEARN_PHI:
             observer.adapt_phi(s, c, dt, x2)
@@ -280,7 +280,7 @@ def follow(s: Any, c: Any, phase: int, dt: float) -> None:
     :param phase: phase of the estimator.
     :param dt: time step [s].
     """
-    x = s.x1 - c.preload
+    x = s.x1 - c.spring_origin
     step = guard.track(s, x, c.play)
     if abs(x - s.rest) > 2.0 * c.play:
         s.rest = x

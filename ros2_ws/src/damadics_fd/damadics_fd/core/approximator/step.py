@@ -164,7 +164,7 @@ def step(
     afresh = dt < 0.0
     if c.ps_lag > 0.0:
         x1, p1, p2 = transmitter.delay(s, c, afresh, abs(dt), x1, p1, p2)
-    y = x1 + c.preload
+    y = x1 + c.spring_origin
     if afresh:
         dt = -dt
         velocity.restart(s, y)
@@ -178,19 +178,19 @@ def step(
     x1_before, x2_before, u_before = s.x1, s.x2, s.u
     smooth = velocity.filter_position(s, c, dt, y)
     u = cv
-    if c.mode == MONITOR:
-        u = force.force_input(c, smooth - c.preload, p1, p2, ps)
+    if c.mode_code == MONITOR:
+        u = force.force_input(c, smooth - c.spring_origin, p1, p2, ps)
     if afresh:
         velocity.restart_input(s, u)
     velocity.filter_input(s, c, dt, u)
 
     if afresh:  # there is no step before the first sample
         x1_before, x2_before, u_before = s.x1, s.x2, s.u
-        dt = 0.0 if c.mode == PAPER else dt
+        dt = 0.0 if c.mode_code == PAPER else dt
 
     phase = learning.phase_of(s, c)
     parts = max(1, int(dt * c.sample_rate / 1.5) + 1)
-    if c.mode == PAPER:
+    if c.mode_code == PAPER:
         parts = max(parts, int(dt * c.k2 / LARGEST_K2_DT) + 1)
     parts = min(parts, SUBSTEPS)
     x1_0, x2_0, u_0 = x1_before, x2_before, u_before

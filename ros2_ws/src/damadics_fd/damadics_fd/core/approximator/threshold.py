@@ -22,6 +22,6 @@ def threshold(c: Any, phi: float, ah1: float) -> float:
     :param ah1: estimate of alpha1 [1/s].
     :return: rho [1/s].
     """
-    if c.threshold == PAPER_RHO:
+    if c.threshold_code == PAPER_RHO:
         return max(abs(phi) / c.k2, c.rho_min)
     return max(c.kappa * abs(phi) / (c.k2 + ah1), c.rho_min)

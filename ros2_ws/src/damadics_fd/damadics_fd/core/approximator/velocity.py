@@ -94,14 +94,14 @@ def filter_position(s: Any, c: Any, dt: float, y: float) -> float:
     :return: the position smoothed without lag on ramps, for the plug force [1].
     """
     smooth = y
-    if c.velocity == HIGH_PASS:  # s/(tau s + 1), Tustin
+    if c.velocity_code == HIGH_PASS:  # s/(tau s + 1), Tustin
         s.v = (2.0 * (y - s.y_raw) + (2.0 * c.tau - dt) * s.v) / (2.0 * c.tau + dt)
         low = y - c.tau * s.v
         s.y_lag += dt * (low + s.y - 2.0 * s.y_lag) / (2.0 * c.tau + dt)
         s.y = low
         s.x1 = low
         smooth = 2.0 * low - s.y_lag  # Brown's double exponential smoothing
-    elif c.velocity == KALMAN:
+    elif c.velocity_code == KALMAN:
         if dt != s.dt:
             tune_kalman(s, c, dt)
         predicted = s.y + dt * s.v
@@ -157,9 +157,9 @@ def filter_input(s: Any, c: Any, dt: float, u: float) -> None:
     :param dt: time since the last sample [s].
     :param u: input [1].
     """
-    if not c.consistent or c.velocity == SUPER_TWISTING:
+    if not c.consistent or c.velocity_code == SUPER_TWISTING:
         s.u = u
-    elif c.velocity == HIGH_PASS:
+    elif c.velocity_code == HIGH_PASS:
         s.uy += dt * (u + s.u_raw - 2.0 * s.uy) / (2.0 * c.tau + dt)
         s.u = s.uy
     else:

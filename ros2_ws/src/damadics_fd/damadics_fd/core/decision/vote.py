@@ -36,7 +36,7 @@ def gated(c: Any, e: Any) -> bool:
     """
     if e.phase != PHASE_MONITOR:
         return False
-    x = e.x1_hat + e.xi1 - c.preload  # the filtered position
+    x = e.x1_hat + e.xi1 - c.spring_origin  # the filtered position
     return x > 1.0 - c.gate_high or (x < c.gate_low and e.xi2 > 0.0)
 
 

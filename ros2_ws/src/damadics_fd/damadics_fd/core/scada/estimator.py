@@ -12,7 +12,6 @@ from damadics_fd.core import quality
 from damadics_fd.core.approximator.estimator import Estimator
 from damadics_fd.core.approximator.step import Estimate
 from damadics_fd.core.modes import PHASE_HOLD, PHASE_INIT, PHASE_LEARN_PHI, PHASE_MONITOR
-from damadics_fd.core.scada.actuator import Actuator
 from damadics_fd.core.scada.monitor import ScadaMonitor
 from damadics_fd.core.scada.pressure import PRESSURE
 from damadics_fd.core.scada.settings import ScadaSettings
@@ -41,14 +40,6 @@ class ScadaEstimator(Estimator):
     """
 
     def __init__(self, settings: Settings) -> None:
-        actuator = Actuator(
-            stroke=settings.stroke,
-            weight=settings.mass * settings.gravity,
-            area=settings.area,
-            spring=settings.stiffness,
-            compression=settings.preload * settings.stroke,
-            plug_area=math.pi * settings.plug_diameter**2 / 4.0,
-        )
         self.monitor = ScadaMonitor(
             ScadaSettings(
                 period_s=1.0 / min(settings.sample_rate, 1.0),
@@ -59,7 +50,7 @@ class ScadaEstimator(Estimator):
                 settle_s=settings.hold,
                 days_per_false_alarm=settings.false_alarm_days,
                 sigma=settings.sensor_noise,
-                actuator=actuator,
+                actuator=settings.valve(),
             )
         )
         super().__init__(settings)
@@ -110,7 +101,7 @@ class ScadaEstimator(Estimator):
                 if decision.monitoring
                 else PHASE_HOLD
             )
-        x = x1 + self.settings.preload
+        x = x1 + self.settings.spring_origin
         return Estimate(
             stamp=stamp,
             x2=math.nan,

@@ -13,12 +13,21 @@ from typing import Any
 import numpy as np
 
 from damadics_fd.core.jit import jit
-from damadics_fd.core.scada.actuator import P_RANGE, pressure_recovery
+from damadics_fd.core.scada.actuator import P_RANGE
+from damadics_fd.core.valve.parameters import Valve
+from damadics_fd.core.valve.plug import recovery
+from damadics_fd.core.valve.pneumatics import (
+    AIR_TEMPERATURE,
+    ATMOSPHERE,
+    GAS_CONSTANT,
+    air_flow,
+    feedback_angle,
+    transducer,
+)
 
 SUB_STEPS = 14  # of 2.5 ms; a day's drift against the plant is then 1e-4 of stroke
 COARSE_SUB_STEPS = 7  # enough for minutes
-ATMOSPHERE = 101325.0
-GAS = 287.0 * 293.0
+GAS = GAS_CONSTANT * AIR_TEMPERATURE
 MINIMUM_SUPPLY = 1.2e5
 
 STEM = np.dtype(
@@ -42,16 +51,16 @@ FAULTS = np.dtype((np.record, [(f'f{number}', np.float64) for number in range(1,
 
 
 @jit
-def start_stem(m: Any, act: Any, t: float) -> None:
-    """Set the rest state at time t, s: chamber empty, valve open (benchmark 1.4, 1.5)."""
-    m.tick = math.ceil(t / act.tick_s)
+def start_stem(m: Any, act: Valve, t: float) -> None:
+    """Set the rest state at time t, s: chamber empty, so that the spring holds the stem."""
+    m.tick = math.ceil(t / act.positioner_period)
     m.y1 = 0.0
     m.y2 = 0.0
     m.p = ATMOSPHERE
-    m.m_a = ATMOSPHERE * act.volume / GAS
-    m.x = 0.0
-    m.X = 0.0
-    m.feedback = 0.0
+    m.m_a = ATMOSPHERE * act.chamber_volume / GAS
+    m.x = 0.0 if act.air_sign > 0.0 else act.stroke
+    m.X = m.x
+    m.feedback = m.x
 
 
 @jit
@@ -68,23 +77,9 @@ def copy_stem(source: Any, target: Any) -> None:
 
 
 @jit
-def transducer(cvi: float) -> float:
-    """Return the output of the E/P transducer, a steep asymmetric curve with a quasi dead zone."""
-    if cvi <= -0.94:
-        return -0.55
-    if cvi < -0.54:
-        return -0.55 + 0.53 * (cvi + 0.94) / 0.40
-    if cvi < 0.46:
-        return -0.02 + 0.04 * (cvi + 0.54)
-    if cvi < 0.86:
-        return 0.02 + 0.98 * (cvi - 0.46) / 0.40
-    return 1.0
-
-
-@jit
 def advance_stem(
     m: Any,
-    act: Any,
+    act: Valve,
     fault: Any,
     t0: float,
     t1: float,
@@ -103,7 +98,7 @@ def advance_stem(
     over cv1 = cv0 for a CV that is held.
 
     :param m: record of `STEM`, changed in place.
-    :param act: record of `Actuator`.
+    :param act: the valve.
     :param fault: record of `FAULTS` (table 2.1); zeros for the nominal model.
     :param t0: time of the previous sample, s.
     :param t1: time of this sample, s.
@@ -114,19 +109,22 @@ def advance_stem(
     :return: X', the position a sensor shows.
     """
     dt = t1 - t0
-    lag = math.exp(-act.tick_s / act.filter_s)
-    h = act.tick_s / sub_steps
+    lag = math.exp(-act.positioner_period / act.positioner_lag)
+    h = act.positioner_period / sub_steps
     mobility = h / act.viscous
     stroke = act.stroke
     per_stroke = 1.0 / stroke
-    area = act.area * (1.0 - fault.f10)
-    spring = act.spring * (1.0 - fault.f11)
-    supply = act.supply * (1.0 - fault.f16)
+    area = act.signed_area * (1.0 - fault.f10)
+    weight = act.mass * act.gravity
+    origin = act.spring_origin * stroke
+    gain = act.air_sign * act.positioner_gain
+    spring = act.stiffness * (1.0 - fault.f11)
+    supply = act.supply_pressure * (1.0 - fault.f16)
     if supply < MINIMUM_SUPPLY:
         supply = 0.0
     top = stroke * (1.0 - fault.f1) * (1.0 - 0.2 * fault.f2) * (1.0 + 0.1 * fault.f3)
     offset = 0.2 * fault.f2 - 0.1 * fault.f3
-    play0 = min(max(stroke * (act.play + fault.f4), 0.0), stroke)
+    play0 = min(max(stroke * (act.stem_play + fault.f4), 0.0), stroke)
     leak = 0.2e-6 * (fault.f9 + fault.f10)
     sensor = 1.0 + 1.25 * fault.f13
     half_feedback = 0.5 * fault.f15 * stroke
@@ -138,8 +136,8 @@ def advance_stem(
     X = m.X
     feedback = m.feedback
     tick = m.tick
-    while tick * act.tick_s < t1:
-        a = (tick * act.tick_s - t0 + 0.5 * act.tick_s) / dt
+    while tick * act.positioner_period < t1:
+        a = (tick * act.positioner_period - t0 + 0.5 * act.positioner_period) / dt
         u = min(max(cv0 + (cv1 - cv0) * a, 0.0), 1.024)
         b = 1.0 - a
         drop = (
@@ -148,27 +146,22 @@ def advance_stem(
             + a * a * (3.0 - 2.0 * a) * dp1
             - a * a * b * dt * slope1
         )
-        thrust = P_RANGE * drop * act.plug_area
+        thrust = P_RANGE * drop * act.signed_plug_area
         # positioner: P controller on the filtered command, E/P transducer
         shown = X
         if fault.f13 != 0.0:
             shown = min(max(X * sensor, -0.25 * stroke), 1.25 * stroke)
         feedback = min(max(feedback, shown - half_feedback), shown + half_feedback)
-        angle = (min(max(feedback, -0.01), 0.05) - 0.5 * stroke) / act.lever
-        pv = 0.5 + math.asin(min(max(angle, -1.0), 1.0)) * 3.0 / math.pi
-        e = transducer(min(max(act.gain * (y2 - pv), -1.0), 1.0)) * (1.0 - fault.f12)
-        e = min(max(e, -1.0), 1.0)
-        source = supply if e > 0.0 else 0.0
-        flow = act.beta * abs(e)
+        pv = feedback_angle(min(max(feedback, -0.01), 0.05), stroke)
+        e = min(max(transducer(y2, pv, gain) * (1.0 - fault.f12), -1.0), 1.0)
         for _ in range(sub_steps):
             gauge = p - ATMOSPHERE
-            volume = act.volume + area * X
-            delta = source - gauge
-            md = flow * math.copysign(math.sqrt(abs(delta)), delta)
+            volume = act.open_volume + area * X
+            md = air_flow(e, supply, gauge, act.air_flow)
             if leak > 0.0:
                 md -= leak * math.copysign(math.sqrt(abs(gauge)), gauge)
-            plug = thrust / pressure_recovery(X * per_stroke + offset)
-            force = act.weight + area * gauge - plug - spring * (X + act.compression)
+            plug = thrust / recovery(act.plug_table, X * per_stroke + offset)
+            force = weight + area * gauge - plug - spring * (X + origin)
             if (force <= 0.0 and X <= 0.0) or (force > 0.0 and top <= X):
                 force = 0.0
             step = mobility * force

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from damadics_fd.core.scada.actuator import ACTUATOR, Actuator
+from damadics_fd.core.valve.parameters import Valve
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class ScadaSettings:
     gap_s: float = 30.0
     settle_s: float = 120.0
     saturated: tuple[float, float] = (0.94, 0.97)
-    actuator: Actuator = field(default_factory=Actuator)
+    actuator: Valve = field(default_factory=Valve)
 
     def __post_init__(self) -> None:
         """Refuse values that make no monitor, all of them in one message."""
@@ -50,7 +50,7 @@ class ScadaSettings:
                 ('learn_s', self.learn_s, self.learn_from_s + 239.0),
                 ('days_per_false_alarm', self.days_per_false_alarm, 0.0),
                 ('sigma', self.sigma, 0.0),
-                ('wide_play', self.wide_play, self.actuator.play),
+                ('wide_play', self.wide_play, self.actuator.stem_play),
             )
             if not value > low
         ]
@@ -71,7 +71,7 @@ SETTINGS = np.dtype(
     (
         np.record,
         [
-            ('act', ACTUATOR),
+            ('act', Valve().record().dtype),
             ('period_s', np.float64),
             ('t_on_s', np.float64),
             ('sigma', np.float64),

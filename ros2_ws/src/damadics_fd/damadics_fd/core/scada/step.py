@@ -29,7 +29,7 @@ def restart(s: Any, cfg: Any, t: float, cv: float, p1: float, p2: float) -> None
     """Start the models and the pressure filter at this sample."""
     start_stem(s.stem[0], cfg.act, t)
     copy_stem(s.stem[0], s.stem[1])
-    s.fault[1].f4 = cfg.wide_play - cfg.act.play
+    s.fault[1].f4 = cfg.wide_play - cfg.act.stem_play
     s.filled = 0
     s.steady = 0
     for i in range(4):
