@@ -8,11 +8,12 @@ import sys
 from pathlib import Path
 
 from damadics_evaluate.baselines import DETECTORS, MissingPackageError
-from damadics_evaluate.campaign import Campaign
+from damadics_evaluate.benchmark.campaign import Campaign
+from damadics_evaluate.benchmark.runner import admit, read_results, run_campaign
+from damadics_evaluate.benchmark.tables import compare, write_csv
 from damadics_evaluate.lublin import command as lublin
-from damadics_evaluate.runner import read_results, run_campaign
-from damadics_evaluate.tables import compare, write_csv
-from damadics_evaluate.trajectories import CACHE_VARIABLE, SCENARIOS
+from damadics_evaluate.scenarios.cases import SCENARIOS
+from damadics_evaluate.scenarios.trajectories import CACHE_VARIABLE
 
 EXAMPLES = f"""\
 examples:
@@ -47,16 +48,23 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument(
         '--scenarios',
         nargs='+',
-        default=list(SCENARIOS),
+        default=None,
         metavar='NAME',
-        help='f1_S .. f19_B, or fN@STRENGTH for an abrupt fault of any strength (all 44)',
+        help='f1_S .. f19_B, fN@STRENGTH for an abrupt one of any strength, my.yaml:mine (all 44)',
+    )
+    run.add_argument(
+        '--faults',
+        nargs='+',
+        default=[],
+        metavar='FILE.py:NAME',
+        help='faults of your own under the inputs of the benchmark',
     )
     run.add_argument(
         '--detectors',
         nargs='+',
         default=list(DETECTORS),
         metavar='NAME',
-        help=f'{", ".join(DETECTORS)} (all)',
+        help=f'{", ".join(DETECTORS)}, my.py:Class, an installed one (all built-in ones)',
     )
     run.add_argument('--seeds', type=int, default=1, metavar='N', help='runs per scenario (1)')
     run.add_argument('--first-seed', type=int, default=0, metavar='N', help='first seed (0)')
@@ -90,11 +98,20 @@ def _parser() -> argparse.ArgumentParser:
     report.add_argument('--to', type=Path, help='directory of the report (that of the campaign)')
     paper = commands.add_parser('paper', help="add the paper's experiments to a campaign")
     paper.add_argument('directory', type=Path)
+    paper.add_argument(
+        '--detectors',
+        nargs='+',
+        default=list(DETECTORS),
+        metavar='NAME',
+        help='as for run (all built-in ones)',
+    )
     versus = commands.add_parser('compare', help='compare two campaigns')
     versus.add_argument('a', type=Path)
     versus.add_argument('b', type=Path)
     versus.add_argument('--csv', type=Path, help='write all rows here')
     lublin.add_parser(commands)
+    check = commands.add_parser('check', help='test a detector: finite, repeatable, causal')
+    check.add_argument('detectors', nargs='+', metavar='my.py:Class')
     return parser
 
 
@@ -113,21 +130,24 @@ def main(argv: list[str] | None = None) -> int:
             'compare': _compare,
             'paper': _paper,
             'lublin': lublin.lublin,
+            'check': _check,
         }
-        commands[arguments.command](arguments)
+        return commands[arguments.command](arguments) or 0
     except (ValueError, OSError, MissingPackageError, ImportError) as error:
         print(f'evaluate: {error}', file=sys.stderr)
         return 1
     except KeyboardInterrupt:
         print('evaluate: stopped; the same command goes on from here', file=sys.stderr)
         return 130
-    return 0
 
 
 def _run(arguments: argparse.Namespace) -> None:
     first = arguments.first_seed
+    stated = arguments.scenarios
+    if stated is None:
+        stated = [] if arguments.faults else list(SCENARIOS)
     campaign = Campaign(
-        scenarios=tuple(arguments.scenarios),
+        scenarios=(*stated, *arguments.faults),
         detectors=tuple(arguments.detectors),
         seeds=tuple(range(first, first + arguments.seeds)),
         calibration_days=arguments.calibration_days,
@@ -135,16 +155,40 @@ def _run(arguments: argparse.Namespace) -> None:
         debounce=arguments.debounce,
         isolated_seeds=arguments.isolated_seeds,
     )
+    campaign = admit(campaign, _tell)
     results = run_campaign(campaign, arguments.out, arguments.jobs, arguments.scheduler)
+    for reason in dict.fromkeys(r['reason'] for r in results if r['kind'] == 'refused'):
+        _tell(f'refused: {reason}')
     print(f'{len(results)} results in {arguments.out}')
     if not arguments.no_report:
         _write_report(arguments.out, arguments.out)
 
 
-def _paper(arguments: argparse.Namespace) -> None:
-    from damadics_evaluate.paper import write_paper
+def _tell(text: str) -> None:
+    print(f'evaluate: {text}', file=sys.stderr)
 
-    print(write_paper(arguments.directory))
+
+def _check(arguments: argparse.Namespace) -> int:
+    from damadics_evaluate.benchmark.runner import CHECKED_ON
+    from damadics_evaluate.detectors.check import problems
+    from damadics_evaluate.detectors.find import find_detector
+    from damadics_evaluate.scenarios.trajectories import learning_hour, scenario_run
+
+    hour, samples = learning_hour(0), scenario_run(CHECKED_ON, 0)[0]
+    found = [
+        p for name in arguments.detectors for p in problems(find_detector(name), hour, samples)
+    ]
+    for problem in found:
+        print(problem)
+    if not found:
+        print(f'{len(arguments.detectors)} detectors pass')
+    return 1 if found else 0
+
+
+def _paper(arguments: argparse.Namespace) -> None:
+    from damadics_evaluate.benchmark.paper import write_paper
+
+    print(write_paper(arguments.directory, arguments.detectors))
 
 
 def _report(arguments: argparse.Namespace) -> None:
@@ -152,7 +196,7 @@ def _report(arguments: argparse.Namespace) -> None:
 
 
 def _write_report(source: Path, target: Path) -> None:
-    from damadics_evaluate.report import write_report
+    from damadics_evaluate.report.write import write_report
 
     for file in write_report(source, target):
         print(file)

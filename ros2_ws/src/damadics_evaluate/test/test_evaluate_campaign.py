@@ -9,16 +9,13 @@ import re
 import numpy as np
 import pytest
 from damadics_evaluate import main
-from damadics_evaluate.campaign import (
+from damadics_evaluate.benchmark.campaign import (
     CALIBRATION_SEED,
     NOMINAL_SEED,
     Campaign,
-    debounced,
-    limits,
-    scenario_unit,
 )
-from damadics_evaluate.runner import read_results, run_campaign
-from damadics_evaluate.tables import (
+from damadics_evaluate.benchmark.runner import read_results, run_campaign
+from damadics_evaluate.benchmark.tables import (
     compare,
     false_alarms,
     operating_curve,
@@ -26,10 +23,10 @@ from damadics_evaluate.tables import (
     sign_test,
     summary,
 )
-from damadics_evaluate.trajectories import (
+from damadics_evaluate.benchmark.units import debounced, limits, scenario_unit
+from damadics_evaluate.scenarios.cases import SCENARIOS, case
+from damadics_evaluate.scenarios.trajectories import (
     CACHE_VARIABLE,
-    SCENARIOS,
-    case,
     learning_hour,
     scenario_run,
 )

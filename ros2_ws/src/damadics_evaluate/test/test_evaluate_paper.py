@@ -3,7 +3,7 @@
 """Table of the paper's experiments: what counts as a detection, what as an alarm before it."""
 
 import numpy as np
-from damadics_evaluate.paper import Row, _limited, _rising
+from damadics_evaluate.benchmark.paper import Row, _limited, _rising
 
 
 def test_rising_edges():

@@ -170,6 +170,18 @@ class Simulator:
         self._faults.clear()
         self._lay_out_faults()
 
+    def replace_actuator(self, actuator: Actuator) -> None:
+        """
+        Go on with other constants of the valve from the next sample on.
+
+        :param actuator: of the same model as before.
+        :raises ValueError: if it is of another model.
+        """
+        if type(actuator) is not type(self.actuator):
+            raise ValueError(f'actuator: {actuator!r} is no {type(self.actuator).__name__}')
+        self._constants = actuator.record()
+        self._lay_out_faults()
+
     def _lay_out_faults(self) -> None:
         self._table = fault_table(self._faults)
         self._effects = np.zeros(1, EFFECTS_DTYPE)

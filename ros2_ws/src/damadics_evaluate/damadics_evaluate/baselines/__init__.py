@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Detectors under test: the SCADA-rate monitor and what a user would pick instead."""
 
-from damadics_evaluate.baselines.base import Detector, MissingPackageError
 from damadics_evaluate.baselines.drift import Adwin, PageHinkley
 from damadics_evaluate.baselines.kalman import InnovationEkf
 from damadics_evaluate.baselines.multivariate import IsolationForest, PrincipalComponents
@@ -15,6 +14,7 @@ from damadics_evaluate.baselines.residuals import (
     SmartPositioner,
 )
 from damadics_evaluate.baselines.scada import FlowThreshold, ModelThreshold, Scada
+from damadics_evaluate.detectors.base import Detector, MissingPackageError
 
 DETECTORS: dict[str, type[Detector]] = {
     kind.name: kind
@@ -36,16 +36,4 @@ DETECTORS: dict[str, type[Detector]] = {
     )
 }
 
-
-def find_detector(name: str) -> type[Detector]:
-    """
-    Return a detector by name.
-
-    :raises ValueError: where there is none.
-    """
-    if name not in DETECTORS:
-        raise ValueError(f'no detector {name}: detectors are {", ".join(DETECTORS)}')
-    return DETECTORS[name]
-
-
-__all__ = ['DETECTORS', 'Detector', 'MissingPackageError', 'find_detector']
+__all__ = ['DETECTORS', 'Detector', 'MissingPackageError']

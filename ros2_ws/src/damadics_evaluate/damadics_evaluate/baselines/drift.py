@@ -1,36 +1,47 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Drift detectors of the river library on the size of the FIR residual."""
+"""Drift detectors on the size of the FIR residual: Page-Hinkley, ADWIN of the river library."""
 
 import math
-from typing import Any
 
 import numpy as np
+from damadics_fd.core.jit import jit
 
-from damadics_evaluate.baselines.base import Floats, require
 from damadics_evaluate.baselines.residuals import FirResidual
+from damadics_evaluate.columns import Floats
+from damadics_evaluate.detectors.base import require
+
+
+@jit
+def _page_hinkley(values: np.ndarray, delta: float, alpha: float) -> np.ndarray:
+    """Return Page's statistic of a rise or a fall of the mean, as Hinkley (1971) and river do."""
+    out = np.zeros_like(values)
+    mean = 0.0
+    rise = 0.0
+    fall = 0.0
+    lowest = math.inf
+    highest = -math.inf
+    for i in range(values.size):
+        mean += (values[i] - mean) / (i + 1)
+        rise = alpha * rise + (values[i] - mean - delta)
+        fall = alpha * fall + (values[i] - mean + delta)
+        lowest = min(lowest, rise)
+        highest = max(highest, fall)
+        out[i] = max(rise - lowest, highest - fall)
+    return out
 
 
 class PageHinkley(FirResidual):
-    """river's Page-Hinkley; the statistic is its own test value."""
+    """Page-Hinkley on the size of the FIR residual; the statistic is its own test value."""
 
-    name, title = 'page_hinkley', 'Page-Hinkley (river)'
+    name, title = 'page_hinkley', 'Page-Hinkley'
 
     def __init__(self, delta: float = 0.05, alpha: float = 0.9999) -> None:
         self.delta = delta
         self.alpha = alpha
 
     def _test(self, z: Floats) -> Floats:
-        drift = require('river.drift', self.name)
-        # a threshold of its own would reset the sums at every detection
-        test = drift.PageHinkley(delta=self.delta, alpha=self.alpha, threshold=math.inf)
-        out = np.zeros_like(z)
-        for i, value in enumerate(np.abs(z).tolist()):
-            test.update(value)
-            out[i] = max(
-                test._sum_increase - test._min_increase, test._max_decrease - test._sum_decrease
-            )
-        return out
+        return np.asarray(_page_hinkley(np.abs(z), self.delta, self.alpha))
 
 
 class Adwin(FirResidual):
@@ -48,7 +59,7 @@ class Adwin(FirResidual):
         self.decades = decades
 
     def _test(self, z: Floats) -> Floats:
-        drift: Any = require('river.drift', self.name)
+        drift = require('river.drift', self.name)
         values = np.clip(np.abs(z) / 20.0, 0.0, 1.0).tolist()  # ADWIN assumes [0, 1]
         out = np.zeros(len(values))
         for decade in self.decades:

@@ -10,17 +10,8 @@ from damadics_fd.core.scada.actuator import nominal_flow
 from damadics_fd.core.valve.parameters import Valve
 from damadics_fd.core.valve.plug import RECOVERY, recovery
 
-from damadics_evaluate.baselines.base import (
-    CV,
-    P1,
-    P2,
-    T1,
-    Detector,
-    F,
-    Floats,
-    X,
-    require,
-)
+from damadics_evaluate.columns import Floats
+from damadics_evaluate.detectors.base import CV, P1, P2, T1, Detector, F, X, require
 
 ACT = Valve()
 KM = np.array(RECOVERY)

@@ -6,17 +6,8 @@ from abc import abstractmethod
 
 import numpy as np
 
-from damadics_evaluate.baselines.base import (
-    CV,
-    P1,
-    P2,
-    T1,
-    Detector,
-    F,
-    Floats,
-    X,
-    require,
-)
+from damadics_evaluate.columns import Floats
+from damadics_evaluate.detectors.base import CV, P1, P2, T1, Detector, F, X, require
 
 SIGNALS = (CV, X, P1, P2, T1, F)
 LAGS = 3

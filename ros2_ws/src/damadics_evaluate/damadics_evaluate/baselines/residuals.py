@@ -8,7 +8,8 @@ from abc import abstractmethod
 import numpy as np
 from damadics_fd.core.jit import jit
 
-from damadics_evaluate.baselines.base import CV, Detector, Floats, X
+from damadics_evaluate.columns import Floats
+from damadics_evaluate.detectors.base import CV, Detector, X
 
 FIR_TAPS = 4
 

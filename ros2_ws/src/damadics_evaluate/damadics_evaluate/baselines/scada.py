@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from damadics_fd.core import scada
@@ -19,7 +18,8 @@ from damadics_fd.core.scada.settings import ScadaSettings
 from damadics_fd.core.scada.state import HISTORY_LENGTH
 from numpy.typing import NDArray
 
-from damadics_evaluate.baselines.base import P1, P2, T1, Detector, Floats
+from damadics_evaluate.columns import Floats
+from damadics_evaluate.detectors.base import P1, P2, T1, Detector, Diagnosis, Setting
 
 SIGNATURE = ('m1', 'g1', 'd1', 'rms1', 'm2', 'g2', 'rms2', 'dP1', 'dP2', 'dT1')
 SIGNATURE_S = 600
@@ -88,14 +88,8 @@ class Scada(Detector):
         values = (m1, g1, d1, rows['r1'].std(), m2, g2, flow.std(), *shift)
         return dict(zip(SIGNATURE, (round(float(v), 6) for v in values), strict=True))
 
-    def isolate_at(self, samples: Floats, times: Sequence[float]) -> list[Isolation]:
-        """
-        Run again and isolate at given times.
-
-        :param samples: rows of a run.
-        :param times: ascending, s.
-        :return: one isolation per time at which the record sufficed.
-        """
+    def isolate_at(self, samples: Floats, alarm: float, times: Sequence[float]) -> list[Diagnosis]:
+        """Run again and isolate at given times; see `Detector`."""
         self.monitor.reset()
         found = []
         done = 0
@@ -105,18 +99,28 @@ class Scada(Detector):
             done = until
             isolation = self.monitor.isolate()
             if isolation is not None:
-                found.append(isolation)
+                found.append(_diagnosis(isolation))
         return found
 
-    def settings(self) -> dict[str, Any]:
+    def settings(self) -> dict[str, Setting]:
         """Return the settings of the monitor and a digest of its source, which holds margins."""
         return {**asdict(self._settings), 'source': _source()}
+
+
+def _diagnosis(isolation: Isolation) -> Diagnosis:
+    best = isolation.best.cost
+    return Diagnosis(
+        isolation.t,
+        tuple((h.fault, float(h.strength), float(h.cost - best)) for h in isolation.ranking),
+        tuple(isolation.candidates),
+        isolation.group,
+    )
 
 
 @cache
 def _source() -> str:
     digest = hashlib.sha256()
-    for file in sorted(Path(scada.__path__[0]).glob('*.py')):
+    for file in sorted(Path(scada.__path__[0]).rglob('*.py')):
         digest.update(file.read_bytes())
     return digest.hexdigest()[:12]
 

@@ -9,9 +9,9 @@ from damadics_fd.core.pipeline import run
 from damadics_fd.core.scada.estimator import ScadaEstimator
 from damadics_fd.core.settings import Settings
 
-from damadics_evaluate.baselines import find_detector
-from damadics_evaluate.baselines.base import Detector
 from damadics_evaluate.columns import NANOSECONDS, Columns, Floats, cut, rows_of, stretches
+from damadics_evaluate.detectors.base import Detector
+from damadics_evaluate.detectors.find import find_detector
 from damadics_evaluate.lublin.judge import Alarm, alarms_of
 
 MARGIN = 1.5

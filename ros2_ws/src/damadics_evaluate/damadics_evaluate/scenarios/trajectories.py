@@ -11,100 +11,27 @@ added from that run's seed.
 import hashlib
 import os
 import re
-from dataclasses import dataclass
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import numpy as np
-from damadics_fd.core.scada.monitor import scada_samples
-from numpy.typing import NDArray
+from damadics_fd.core import valve
+from damadics_plant import Simulator, load_scenario
+from damadics_plant import __path__ as plant_path
 
-from damadics_evaluate.indices import T_FROM, Zones
+from damadics_evaluate.columns import Columns, Floats, rows_of
+from damadics_evaluate.scenarios.cases import NOMINAL, case
+from damadics_evaluate.scenarios.own import OwnFault, digest, load_fault
 
-Floats = NDArray[np.float64]
 NOISE = 1.414e-3  # standard deviation of the benchmark's sensor noise, share of full scale
 HOUR = 3600
 DAY = 86400
 PLANT_SEEDS = 20  # different disturbances of CV inside the plant; a run's seed picks one
 LONG_PLANT_SEEDS = 4  # the same for runs of a day, each of which takes seconds to integrate
 LEARNING, FREE = 10_000, 20_000  # added to it, so that fault-free records share none
-DEVELOPMENT = {'S': 0.0, 'M': 0.0, 'B': 0.0, 'I': 86400.0}
-SHORT_DEVELOPMENT = {4: 3600.0, 13: 900.0, 17: 3600.0}
 CACHE_VARIABLE = 'DAMADICS_FD_CACHE'
-STANDARD = {
-    1: 'SMB',
-    2: 'BI',
-    3: 'I',
-    4: 'I',
-    5: 'I',
-    6: 'I',
-    7: 'SMB',
-    8: 'SMB',
-    9: 'I',
-    10: 'SMB',
-    11: 'BI',
-    12: 'SMB',
-    13: 'SMBI',
-    14: 'SMB',
-    15: 'B',
-    16: 'SMB',
-    17: 'BI',
-    18: 'SMBI',
-    19: 'SMB',
-}
-SCENARIOS = tuple(f'f{fault}_{mode}' for fault, modes in STANDARD.items() for mode in modes)
-
-
-@dataclass(frozen=True)
-class Case:
-    """
-    One standard scenario, or the plant with one fault of any strength.
-
-    :param name: name of the scenario, such as f4_I.
-    :param fault: number of the fault, 0 for none.
-    :param zones: its time zones.
-    """
-
-    name: str
-    fault: int
-    zones: Zones
-
-    @property
-    def abrupt(self) -> bool:
-        """Tell whether the fault comes at once."""
-        return self.zones.t_hor <= T_FROM + 600.0
-
-    @property
-    def duration(self) -> int:
-        """Return the length of the run, s."""
-        return int(self.zones.t_hor)
-
-
-def case(name: str) -> Case:
-    """
-    Return a standard scenario by name, or an abrupt fault of any strength.
-
-    :param name: f1_S .. f19_B, or for example f12@-0.37.
-    :return: the case.
-    :raises ValueError: for a name that is neither.
-
-    >>> case('f4_I').zones.t_hor
-    5100.0
-    >>> case('f12@-0.37').fault
-    12
-    """
-    free = re.fullmatch(r'f(\d+)@(-?[\d.]+)', name)
-    if free and int(free[1]) in STANDARD and abs(float(free[2])) <= 1.0:
-        return Case(name, int(free[1]), Zones())
-    if name not in SCENARIOS:
-        raise ValueError(f'no scenario {name}: one of {", ".join(SCENARIOS)} or f11@0.37')
-    match = re.fullmatch(r'f(\d+)_([SMBI])', name)
-    assert match is not None
-    fault, mode = int(match[1]), match[2]
-    t_fd = DEVELOPMENT[mode]
-    if mode == 'I':
-        t_fd = SHORT_DEVELOPMENT.get(fault, t_fd)
-    return Case(name, fault, Zones.of_development(t_fd))
+FREE_OF_FAULTS = ' without its faults'
 
 
 def cache_directory() -> Path:
@@ -119,38 +46,85 @@ def cache_directory() -> Path:
 @cache
 def _plant_hash() -> str:
     """Return a hash of the plant's source, so that another plant makes new trajectories."""
-    import damadics_plant
-
-    digest = hashlib.sha256()
-    for file in sorted(Path(damadics_plant.__path__[0]).rglob('*.py')):
-        digest.update(file.read_bytes())
-    return digest.hexdigest()[:12]
+    digest_of_sources = hashlib.sha256()
+    for folder in (plant_path[0], valve.__path__[0]):
+        for file in sorted(Path(folder).rglob('*.py')):
+            digest_of_sources.update(file.read_bytes())
+    return digest_of_sources.hexdigest()[:12]
 
 
 def trajectory(name: str, duration: int, plant_seed: int) -> tuple[Floats, Floats]:
     """
     Return a run of the plant at 1 Hz without sensor noise.
 
-    :param name: scenario, or 'nominal'.
+    :param name: case, 'nominal', or a scenario file followed by FREE_OF_FAULTS.
     :param duration: seconds.
     :param plant_seed: seed of the disturbance of CV inside the plant.
     :return: rows t, CV, X', P1', P2', T1', F' (0..1) and the fault strength.
     """
-    from damadics_plant import simulate
-
+    own = '.py:' in name or '.yaml' in name
+    stem = re.sub(r'[^\w@.+-]', '_', Path(name).name)
+    if own:
+        place = hashlib.sha256(name.encode()).hexdigest()[:8]
+        stem = f'{stem}_{place}_{digest(name.removesuffix(FREE_OF_FAULTS))}'
     directory = cache_directory() / 'trajectories' / _plant_hash()
-    file = directory / f'{name}_{duration}_{plant_seed}.npy'
+    file = directory / f'{stem}_{duration}_{plant_seed}.npy'
     if file.exists():
         stored = np.load(file)
     else:
-        columns = simulate(name, rate=1.0, duration=float(duration), noise='cv', seed=plant_seed)
-        stored = np.column_stack((scada_samples(columns), columns['strength']))
+        columns = _simulated(name, float(duration), plant_seed)
+        stored = np.column_stack((rows_of(columns), columns['strength']))
         directory.mkdir(parents=True, exist_ok=True)
         partial = file.with_suffix(f'.{os.getpid()}.tmp')
         with partial.open('wb') as stream:
             np.save(stream, stored)
         partial.replace(file)
     return stored[:, :7], stored[:, 7]
+
+
+def _simulated(name: str, duration: float, seed: int) -> Columns:
+    """Return the plant's answer to a case."""
+    fault: OwnFault | None = None
+    if '.py:' in name:
+        fault, name = load_fault(name), NOMINAL
+    scenario = load_scenario(name.removesuffix(FREE_OF_FAULTS))
+    if name.endswith(FREE_OF_FAULTS):
+        scenario = replace(scenario, faults=())
+    plant = Simulator(scenario, rate=1.0, duration=duration, noise='cv', seed=seed)
+    if fault is None:
+        return plant.advance(plant.samples)
+    return with_fault(plant, fault)
+
+
+def with_fault(plant: Simulator, fault: OwnFault) -> Columns:
+    """
+    Run a plant with a fault of one's own to its end.
+
+    :param plant: at the start of a scenario, one sample per second.
+    :param fault: changes the valve second by second, and what is recorded.
+    :return: columns as of the plant, `strength` that of the fault.
+    :raises ValueError: where the fault returns something else than it should.
+    """
+    t = np.arange(plant.samples) / plant.rate
+    strength = fault.at(t)
+    parts, done = [], 0
+    while done < len(t):
+        last = done + 1
+        if fault.valve is not None:
+            plant.replace_actuator(fault.valve(plant.actuator, float(strength[done])))
+            while last < len(t) and strength[last] == strength[done]:
+                last += 1
+        else:
+            last = len(t)
+        parts.append(plant.advance(last - done))
+        done = last
+    columns = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
+    if fault.signals is not None:
+        changed = fault.signals({key: value.copy() for key, value in columns.items()}, strength)
+        if set(changed) != set(columns) or any(len(v) != len(t) for v in changed.values()):
+            raise ValueError(f'{fault.name}: signals() must return all columns, all samples')
+        columns = dict(changed)
+    return {**columns, 'strength': strength}
 
 
 def noisy(samples: Floats, seed: int, purpose: str) -> Floats:
@@ -178,9 +152,14 @@ def scenario_run(name: str, seed: int) -> tuple[Floats, Floats]:
     return noisy(clean, seed, name), strength
 
 
-def learning_hour(seed: int) -> Floats:
-    """Return the fault-free hour that belongs to a seed."""
-    clean, _ = trajectory('nominal', HOUR, seed % PLANT_SEEDS + LEARNING)
+def learning_hour(seed: int, feed: str = NOMINAL) -> Floats:
+    """
+    Return the fault-free hour that belongs to a seed.
+
+    :param feed: scenario whose inputs it has.
+    """
+    name = feed if feed == NOMINAL else feed + FREE_OF_FAULTS
+    clean, _ = trajectory(name, HOUR, seed % PLANT_SEEDS + LEARNING)
     return noisy(clean[:HOUR], seed, 'learning hour')
 
 

@@ -10,16 +10,16 @@ from typing import Any
 import numpy as np
 from damadics_fd.figures.panels import BLUE, GREY, ORANGE, STYLE
 
-from damadics_evaluate.baselines import DETECTORS
 from damadics_evaluate.baselines.scada import SIGNATURE
-from damadics_evaluate.tables import (
+from damadics_evaluate.benchmark.tables import (
     Result,
     delays,
     operating_curve,
     scenario_results,
     unobservable,
 )
-from damadics_evaluate.trajectories import SCENARIOS
+from damadics_evaluate.detectors.find import title_of
+from damadics_evaluate.scenarios.cases import SCENARIOS
 
 STRENGTHS = {'S': 0.25, 'M': 0.5, 'B': 0.75}
 OTHERS = ('#e07b00', '#2e8b57', '#8a4fa8', '#c8102e', '#5a6068', '#00838f', '#b58900', '#6b8e23')
@@ -48,11 +48,6 @@ def _colours(names: Sequence[str]) -> dict[str, tuple[str, float, str]]:
         styles[name] = (OTHERS[i % len(OTHERS)], 1.2, '-' if i < len(OTHERS) else '--')
     styles['scada'] = (BLUE, 2.6, '-')
     return styles
-
-
-def title_of(name: str) -> str:
-    """Return the title of a detector."""
-    return DETECTORS[name].title if name in DETECTORS else name
 
 
 def delay_curves(results: Sequence[Result], detectors: Sequence[str]) -> str:

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from damadics_evaluate.campaign import FACTORS
+from damadics_evaluate.benchmark.units import FACTORS
 from damadics_evaluate.indices import T_FROM, T_ON
-from damadics_evaluate.trajectories import SCENARIOS, case
+from damadics_evaluate.scenarios.cases import SCENARIOS, case
 
 Result = dict[str, Any]
 NOT_OBSERVABLE = {

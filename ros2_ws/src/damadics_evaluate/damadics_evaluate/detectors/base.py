@@ -4,23 +4,32 @@
 
 import importlib
 from abc import ABC, abstractmethod
-from typing import Any, ClassVar
+from collections.abc import Sequence
+from dataclasses import dataclass
+from types import ModuleType
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from damadics_evaluate.columns import Floats
 from damadics_evaluate.indices import T_ON
 
-Floats = NDArray[np.float64]
 T, CV, X, P1, P2, T1, F = range(7)
-PACKAGES = {'sklearn': 'scikit-learn', 'river': 'river', 'filterpy': 'filterpy'}
+PACKAGES = {
+    'sklearn': 'scikit-learn',
+    'river': 'river',
+    'filterpy': 'filterpy',
+    'scipy': 'scipy',
+}
+Setting = bool | int | float | str | tuple[float, ...]
 
 
 class MissingPackageError(ImportError):
     """A baseline's library is not installed; the message tells how to get it."""
 
 
-def require(module: str, detector: str) -> Any:
+def require(module: str, detector: str) -> ModuleType:
     """
     Import a library that only a baseline needs.
 
@@ -37,6 +46,23 @@ def require(module: str, detector: str) -> Any:
             f'detector {detector} needs {package}: pip install {package}, '
             f'or leave it out with --detectors'
         ) from error
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """
+    What a detector names at one time.
+
+    :param t: s.
+    :param ranking: fault, strength (NaN if unknown) and cost over the best, best first.
+    :param candidates: the faults that it does not tell apart.
+    :param group: of the best fault, as `core.scada` groups them.
+    """
+
+    t: float
+    ranking: tuple[tuple[int, float, float], ...]
+    candidates: tuple[int, ...]
+    group: str = ''
 
 
 class Detector(ABC):
@@ -76,7 +102,18 @@ class Detector(ABC):
         """
         return ''
 
-    def settings(self) -> dict[str, Any]:
+    def isolate_at(self, samples: Floats, alarm: float, times: Sequence[float]) -> list[Diagnosis]:
+        """
+        Name the fault at given times after an alarm, each time from what came before it.
+
+        :param samples: rows of a run.
+        :param alarm: when the alarm was raised, s.
+        :param times: ascending, s.
+        :return: one diagnosis per time at which there was enough; empty where it names nothing.
+        """
+        return []
+
+    def settings(self) -> dict[str, Setting]:
         """Return the plain numbers that shape the detector, for the settings hash."""
         return {
             key: value

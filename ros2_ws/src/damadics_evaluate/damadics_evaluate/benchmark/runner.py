@@ -13,20 +13,23 @@ from pathlib import Path
 from typing import Any
 
 from damadics_evaluate.baselines import DETECTORS
-from damadics_evaluate.campaign import (
+from damadics_evaluate.benchmark.campaign import (
     CALIBRATION_SEED,
     NOMINAL_SEED,
     Campaign,
-    limits,
-    nominal_unit,
-    scenario_unit,
     versions,
 )
-from damadics_evaluate.trajectories import case
+from damadics_evaluate.benchmark.results import Limits, Result
+from damadics_evaluate.benchmark.units import limits, nominal_unit, scenario_unit
+from damadics_evaluate.detectors.check import refuse
+from damadics_evaluate.detectors.find import find_detector
+from damadics_evaluate.detectors.own import RefusedError
+from damadics_evaluate.scenarios.cases import case
+from damadics_evaluate.scenarios.trajectories import learning_hour, scenario_run
 
 RESULTS = 'results.jsonl'
 MANIFEST = 'campaign.json'
-Result = dict[str, Any]
+CHECKED_ON = 'f11_B'  # the run on which detectors of one's own are checked
 Unit = tuple[Callable[..., list[Result]], tuple[Any, ...]]
 
 
@@ -76,6 +79,29 @@ def run_campaign(
     return kept
 
 
+def admit(campaign: Campaign, tell: Callable[[str], None]) -> Campaign:
+    """
+    Check the detectors that are not built in, and leave out those that must not take part.
+
+    :param campaign: as stated.
+    :param tell: told of every detector that is refused, and why.
+    :return: the campaign with the others.
+    :raises ValueError: where none is left.
+    """
+    kept = []
+    for name in campaign.detectors:
+        if name not in DETECTORS:
+            try:
+                refuse(find_detector(name), learning_hour(0), scenario_run(CHECKED_ON, 0)[0])
+            except RefusedError as error:
+                tell(f'refused: {error}')
+                continue
+        kept.append(name)
+    if not kept:
+        raise ValueError('no detector is left: mend them, evaluate check DETECTOR tells how')
+    return replace(campaign, detectors=tuple(kept))
+
+
 def _write_manifest(campaign: Campaign, directory: Path) -> None:
     """Write what was run here, all calls together."""
     file = directory / MANIFEST
@@ -103,7 +129,9 @@ def _missing(campaign: Campaign, name: str, seed: int, done: set[tuple[Any, ...]
 def _nominal_units(campaign: Campaign, done: set[tuple[Any, ...]]) -> Iterator[Unit]:
     for seed in range(CALIBRATION_SEED, CALIBRATION_SEED + campaign.calibration_days):
         part = _missing(campaign, 'nominal', seed, done)
-        part = replace(part, detectors=tuple(d for d in part.detectors if DETECTORS[d].calibrated))
+        part = replace(
+            part, detectors=tuple(d for d in part.detectors if find_detector(d).calibrated)
+        )
         if part.detectors:
             yield nominal_unit, (part, seed)
     for seed in range(NOMINAL_SEED, NOMINAL_SEED + campaign.nominal_days):
@@ -113,7 +141,7 @@ def _nominal_units(campaign: Campaign, done: set[tuple[Any, ...]]) -> Iterator[U
 
 
 def _scenario_units(
-    campaign: Campaign, limit: dict[str, float], done: set[tuple[Any, ...]]
+    campaign: Campaign, limit: Limits, done: set[tuple[Any, ...]]
 ) -> Iterator[Unit]:
     by_length = sorted(campaign.scenarios, key=lambda name: -case(name).duration)
     for name in by_length:  # the longest first, so that no core waits at the end

@@ -11,10 +11,13 @@ from typing import Any
 
 from damadics_fd.core.scada.isolation import NAMES
 
-from damadics_evaluate import plots, tables
-from damadics_evaluate.campaign import CALIBRATION_SEED, NOMINAL_SEED, Campaign, limits
-from damadics_evaluate.runner import MANIFEST, read_results
-from damadics_evaluate.trajectories import SCENARIOS, STANDARD, case
+from damadics_evaluate.benchmark import tables
+from damadics_evaluate.benchmark.campaign import CALIBRATION_SEED, NOMINAL_SEED, Campaign
+from damadics_evaluate.benchmark.runner import MANIFEST, read_results
+from damadics_evaluate.benchmark.units import limits
+from damadics_evaluate.detectors.find import title_of
+from damadics_evaluate.report import figures as plots
+from damadics_evaluate.scenarios.cases import SCENARIOS, STANDARD, case
 
 PAPER = 'paper.json'
 MODEL_BASED = ('scada', 'fixed_r1', 'fixed_r2')
@@ -72,7 +75,7 @@ def _content(campaign: Campaign, results: Sequence[Result]) -> dict[str, Any]:
     return {
         'scenarios': len({r['scenario'] for r in standard}),
         'detectors': detectors,
-        'titles': {d: plots.title_of(d) for d in detectors},
+        'titles': {d: title_of(d) for d in detectors},
         'seeds': f'{min(campaign.seeds)} to {max(campaign.seeds)}',
         'calibration_days': campaign.calibration_days,
         'nominal_days': max((r['days'] for r in false_alarms), default=0),
@@ -150,7 +153,7 @@ def shortfalls(rows: Sequence[dict[str, Any]]) -> list[str]:
     best: dict[str, tuple[float, str]] = {}
     for r in rows:
         if r['detector'] != 'scada':
-            rival = (r['t_dt_median'], plots.title_of(r['detector']))
+            rival = (r['t_dt_median'], title_of(r['detector']))
             best[r['scenario']] = min(best.get(r['scenario'], (math.inf, '')), rival)
     for r in rows:
         if r['detector'] != 'scada':

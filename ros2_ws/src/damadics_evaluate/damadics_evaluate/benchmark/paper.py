@@ -5,23 +5,24 @@
 import base64
 import json
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from damadics_fd.core.pipeline import Result, run
-from damadics_fd.core.scada.monitor import scada_samples
 from damadics_fd.core.scada.settings import ScadaSettings
 from damadics_fd.core.settings import Settings
 from numpy.typing import NDArray
 
-from damadics_evaluate.baselines import DETECTORS, MissingPackageError
-from damadics_evaluate.baselines.base import Floats
 from damadics_evaluate.baselines.kalman import FrictionSpringEkf
 from damadics_evaluate.baselines.scada import Scada
-from damadics_evaluate.trajectories import NOISE
+from damadics_evaluate.columns import Floats, rows_of
+from damadics_evaluate.detectors.base import MissingPackageError
+from damadics_evaluate.detectors.find import find_detector
+from damadics_evaluate.detectors.own import RefusedError
+from damadics_evaluate.scenarios.trajectories import NOISE
 
 RUNS = ('paper_nominal', 'paper_friction', 'paper_spring')
 FAULT_AT = 70.0
@@ -66,11 +67,12 @@ class Row:
         return [self.title, *first, ' / '.join(before), str(len(self.alarms[RUNS[0]]))]
 
 
-def write_paper(directory: Path) -> Path:
+def write_paper(directory: Path, detectors: Sequence[str]) -> Path:
     """
     Run the paper's experiments and keep table and figures for the report.
 
     :param directory: of the campaign.
+    :param detectors: names, beside the modes of this suite.
     :return: file written.
     """
     from damadics_plant import simulate
@@ -86,7 +88,7 @@ def write_paper(directory: Path) -> Path:
     judged = {name: _edges(run(noisy[name], settings)) for name in RUNS}
     rows.append(Row('monitor mode', judged))
     rows.append(Row('SCADA-rate monitor, 1 Hz', _scada()))
-    for row in (_baseline(name, noisy, quiet) for name in DETECTORS):
+    for row in (_baseline(name, noisy, quiet) for name in detectors):
         rows += row
     rows += _states(noisy, quiet)
     file = directory / 'paper.json'
@@ -120,7 +122,7 @@ def _rising(t: Floats, exceeds: NDArray[np.bool_]) -> Alarms:
 
 
 def _samples(columns: Mapping[str, NDArray], clean: Mapping[str, NDArray]) -> Floats:
-    samples = scada_samples(columns)
+    samples = rows_of(columns)
     samples[:, 1] = clean['cv']
     return samples
 
@@ -135,15 +137,15 @@ def _limited(
 
 def _baseline(name: str, noisy: Mapping[str, Any], quiet: list[Any]) -> list[Row]:
     """Return the row of one baseline, none for what does not run at this rate."""
-    detector = DETECTORS[name]()
+    detector = find_detector(name)()
     if name in ('scada', 'fixed_r1', 'fixed_r2'):
         return []
     detector.t_on, detector.learn_from = LEARN_UNTIL, SETTLED
-    first = scada_samples(quiet[0])
+    first = rows_of(quiet[0])
     try:
         detector.fit(first[first[:, 0] <= LEARN_UNTIL])
-        alarms = _limited(lambda c: detector.statistic(scada_samples(c)), noisy, quiet)
-    except MissingPackageError as error:
+        alarms = _limited(lambda c: detector.statistic(rows_of(c)), noisy, quiet)
+    except (MissingPackageError, RefusedError) as error:
         return [Row(f'{detector.title}: {error}', {n: np.array([]) for n in RUNS})]
     return [Row(detector.title, alarms)]
 

@@ -1,0 +1,3 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""The report of a campaign: page, tables for papers, figures."""
