@@ -6,6 +6,7 @@ ARGS ?=
 SEEDS ?= 1
 ENV := source ./env.sh
 BUILT := ros2_ws/install/.built
+READERS := tools/npm/node_modules/.package-lock.json
 SOURCES := $(shell find ros2_ws/src -type f -not -name '*.pyc' -not -path '*/__pycache__/*' \
 	-not -path '*/test/*' -not -path '*/.pytest_cache/*')
 
@@ -20,7 +21,7 @@ demo: $(BUILT) ## the paper's two experiments through the running nodes: table, 
 dashboard: $(BUILT) ## a simulated valve and the web page at http://127.0.0.1:8080
 	@$(ENV) && ros2 run damadics_bringup run --simulate --dashboard $(ARGS)
 
-test: $(BUILT) ## run all tests
+test: $(BUILT) $(READERS) ## run all tests
 	@$(ENV) && python -m pytest -m 'not slow' -o pythonpath=tests $(ARGS)
 
 report: $(BUILT) ## the benchmark's 44 scenarios x all detectors: docs/results/ (minutes; more: SEEDS=20)
@@ -40,6 +41,11 @@ $(BUILT): $(SOURCES) tools/build.sh tools/setup_env.py $(wildcard tools/requirem
 	@$(PYTHON) tools/setup_env.py
 	@tools/build.sh
 
+$(READERS): tools/npm/package-lock.json
+	@if command -v npm > /dev/null; then \
+		echo 'Setting up the readers of Foxglove and Lichtblick ...'; npm ci --silent --prefix tools/npm; \
+	else echo 'npm is not installed: bags are not checked with the readers of Foxglove'; fi
+
 lint: $(BUILT) ## check style and types
 	@$(ENV) && ruff check . && ruff format --check .
 	@$(MAKE) --no-print-directory types
@@ -52,4 +58,4 @@ docs: $(BUILT) ## the documentation with the API pages: docs/_build/index.html
 		&& sphinx-build -q -W --keep-going docs docs/_build && echo docs/_build/index.html
 
 clean: ## remove everything that was built
-	rm -rf .venv docs/_build ros2_ws/build ros2_ws/install ros2_ws/log
+	rm -rf .venv docs/_build tools/npm/node_modules ros2_ws/build ros2_ws/install ros2_ws/log

@@ -54,7 +54,8 @@ def simulated(name: str) -> dict[str, np.ndarray]:
 def write(name: str, columns: dict[str, np.ndarray]) -> Path:
     """Write one bag, as small as it gets."""
     path = HERE / f'{name}.mcap'
-    with BagWriter(path, level=19, chunk_size=1 << 22, message_index=False) as bag:
+    path.unlink(missing_ok=True)
+    with BagWriter(path, level=19, chunk_size=1 << 22) as bag:
         bag.add_topic('/measurement', 'damadics_msgs/msg/Measurement', [qos(depth=1000)])
         bag.add_topic('/fault_state', 'damadics_msgs/msg/FaultState', [qos(depth=1000)])
         bag.write_columns(

@@ -127,9 +127,10 @@ def iter_columns(
 
 
 def resolved(topic: str, file: MessageFile) -> str:
-    """Return a topic as the file has it: exactly as given, or with a slash in front."""
+    """Return a topic as the file has it: exactly as given, or with or without a slash in front."""
     names = {channel.topic for channel in file.channels.values()}
-    return topic if topic in names else '/' + topic.lstrip('/')
+    bare = topic.lstrip('/')
+    return next((name for name in (topic, '/' + bare, bare) if name in names), topic)
 
 
 def listing(names: Iterable[str]) -> str:

@@ -47,6 +47,7 @@ class FlagWriter:
             name: prefix + name for name in ('estimate', 'residual', 'threshold', 'fault_flag')
         }
         self._frame_id = _frame_id(recording)
+        path.unlink(missing_ok=True)  # what an earlier replay wrote is no recording
         self._bag = BagWriter(path)
         kinds = {'estimate': ESTIMATE, 'residual': NUMBER, 'threshold': NUMBER, 'fault_flag': FLAG}
         for name, kind in kinds.items():
