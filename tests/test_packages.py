@@ -24,7 +24,13 @@ ORDER = {  # a package knows only those of a lower floor
     'damadics_dashboard': 4,
     'damadics_bringup': 5,
 }
-DISTRIBUTIONS = {'sklearn': 'scikit-learn', 'distributed': 'dask', 'yaml': 'pyyaml'}
+DISTRIBUTIONS = {
+    'sklearn': 'scikit-learn',
+    'distributed': 'dask',
+    'yaml': 'pyyaml',
+    'google': 'protobuf',
+    'prometheus_client': 'prometheus-client',
+}
 KEYS = {'PIL': 'python3-pil', 'dask': 'python3-dask'}
 IMPLIED = {'rosidl_default_runtime', 'ros2cli', 'ros2launch'}  # run, never imported
 

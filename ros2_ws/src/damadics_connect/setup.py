@@ -23,7 +23,7 @@ setup(
     extras_require={
         'opcua': ['asyncua'],
         'mqtt': ['aiomqtt', 'protobuf'],
-        'http': ['fastapi', 'uvicorn', 'prometheus-client'],
+        'http': ['fastapi', 'pydantic', 'uvicorn', 'prometheus-client'],
         'notify': ['apprise'],
         'parquet': ['pyarrow'],
         'test': ['pytest', 'amqtt', 'aiosmtpd', 'httpx'],

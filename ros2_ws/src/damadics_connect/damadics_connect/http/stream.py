@@ -1,0 +1,92 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Server-sent events: every change of state and every transition, to everybody who listens."""
+
+import asyncio
+import contextlib
+import json
+from collections import deque
+from collections.abc import AsyncIterator
+
+from damadics_connect.judgement import Judgement, Transition, as_json
+
+KEPT = 1000  # messages for who comes back with Last-Event-ID
+WAITING = 1000  # messages for one listener who does not take them
+BEAT = 1.0  # s between two signs of life
+
+Message = tuple[int, str, str]  # number, name, data
+
+
+class Stream:
+    """
+    Hands messages from the thread of ROS 2 to listeners in the event loop.
+
+    :param loop: of the listeners.
+    """
+
+    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
+        self._loop = loop
+        self._number = 0
+        self._kept: deque[Message] = deque(maxlen=KEPT)
+        self._listeners: set[asyncio.Queue[Message | None]] = set()
+
+    def state(self, judgement: Judgement) -> None:
+        """Send a valve's new state; call it from any thread."""
+        self._send('valve', json.dumps(as_json(judgement)))
+
+    def event(self, event: Transition) -> None:
+        """Send a transition; call it from any thread."""
+        self._send('event', json.dumps(as_json(event)))
+
+    def close(self) -> None:
+        """End all listeners."""
+        for queue in self._listeners:
+            with contextlib.suppress(asyncio.QueueFull):
+                queue.put_nowait(None)
+
+    async def listen(self, after: int | None) -> AsyncIterator[str]:
+        """
+        Yield messages as the standard for server-sent events writes them.
+
+        :param after: number of the last message that the listener has; None: only new ones.
+        :return: an endless iterator; a comment every second says that the connection lives.
+        """
+        queue: asyncio.Queue[Message | None] = asyncio.Queue(WAITING)
+        missed = [m for m in self._kept if m[0] > after] if after is not None else []
+        self._listeners.add(queue)
+        try:
+            yield 'retry: 1000\n\n'
+            for message in missed:
+                yield _written(message)
+            while True:
+                try:
+                    message_or_end = await asyncio.wait_for(queue.get(), BEAT)
+                except TimeoutError:
+                    yield ': alive\n\n'
+                    continue
+                if message_or_end is None:
+                    return
+                yield _written(message_or_end)
+        finally:
+            self._listeners.discard(queue)
+
+    def _send(self, name: str, data: str) -> None:
+        with contextlib.suppress(RuntimeError):  # the loop has ended before the node
+            self._loop.call_soon_threadsafe(self._spread, name, data)
+
+    def _spread(self, name: str, data: str) -> None:
+        self._number += 1
+        message = (self._number, name, data)
+        self._kept.append(message)
+        for queue in list(self._listeners):
+            try:
+                queue.put_nowait(message)
+            except asyncio.QueueFull:
+                self._listeners.discard(queue)  # it comes back with Last-Event-ID
+                queue.get_nowait()
+                queue.put_nowait(None)
+
+
+def _written(message: Message) -> str:
+    number, name, data = message
+    return f'id: {number}\nevent: {name}\ndata: {data}\n\n'

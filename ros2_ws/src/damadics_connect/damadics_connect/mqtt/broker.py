@@ -1,0 +1,122 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Where the broker is and how it is entered."""
+
+import ssl
+from pathlib import Path
+from typing import NamedTuple
+from urllib.parse import urlsplit
+
+from aiomqtt import Client, Will
+
+from damadics_connect.settings import Secret, Section
+
+SCHEMES = {'mqtt': 1883, 'mqtts': 8883}
+KEEP_ALIVE = 2  # s: a network that is gone is known within three of them
+PATIENCE = 5.0  # s for an answer
+PAUSES = (0.2, 0.5, 1.0, 2.0, 5.0)  # s before a lost broker is tried again
+REMEDIES = {
+    4: 'wrong user name or password',
+    5: 'wrong user name or password',
+    134: 'wrong user name or password',
+    135: 'wrong user name or password',
+}
+
+
+class Broker(NamedTuple):
+    """A broker and who we are there."""
+
+    host: str
+    port: int
+    user: str
+    password: Secret
+    encrypted: bool
+    authority: Path | None
+
+    @property
+    def shown(self) -> str:
+        """Address without secrets."""
+        return f'{self.host}:{self.port}'
+
+    def client(self, will: Will | None = None) -> Client:
+        """
+        Make a client.
+
+        :param will: sent by the broker when we are lost.
+        :return: not yet connected.
+        """
+        context = None
+        if self.encrypted:
+            context = ssl.create_default_context(
+                cafile=str(self.authority) if self.authority else None
+            )
+        return Client(
+            self.host,
+            self.port,
+            username=self.user or None,
+            password=self.password.reveal() or None,
+            will=will,
+            keepalive=KEEP_ALIVE,
+            timeout=PATIENCE,
+            tls_context=context,
+        )
+
+
+def read_broker(config: Section) -> Broker:
+    """
+    Read where the broker is.
+
+    :param config: with `broker`, `user` and `tls`.
+    :return: the broker; mistakes are noted in `config`.
+    """
+    url = config.needed('broker', 'mqtt://broker.example:1883')
+    parts = urlsplit(url)
+    if url and parts.scheme not in SCHEMES:
+        config.refuse('broker', 'does not begin with mqtt:// or mqtts://')
+    if '@' in parts.netloc:
+        config.refuse('broker', 'has a user in it: give user.name and user.password_file')
+    try:
+        port = parts.port or SCHEMES.get(parts.scheme, 1883)
+    except ValueError:
+        config.refuse('broker', 'has no valid port')
+        port = 1883
+    user = config.section('user')
+    tls = config.section('tls')
+    broker = Broker(
+        parts.hostname or '',
+        port,
+        user.text('name'),
+        user.secret('password'),
+        parts.scheme == 'mqtts',
+        tls.path('ca'),
+    )
+    user.done()
+    tls.done()
+    return broker
+
+
+def why(problem: BaseException) -> str:
+    """
+    Say in a few words what went wrong.
+
+    :param problem: of the library or the network.
+    :return: text without secrets.
+    """
+    code = getattr(problem, 'rc', None)
+    number = getattr(code, 'value', code)
+    if isinstance(number, int) and number in REMEDIES:
+        return REMEDIES[number]
+    if isinstance(problem.__cause__, OSError):
+        return why(problem.__cause__)
+    if isinstance(problem, ssl.SSLError):
+        return f'the certificate of the broker is refused: {problem.reason}: give tls.ca'
+    if isinstance(problem, ConnectionRefusedError):
+        return 'nobody listens there: is the broker running?'
+    if isinstance(problem, OSError) and problem.strerror:
+        return problem.strerror
+    text = str(problem)
+    if 'not authori' in text.lower() or 'bad user name' in text.lower():
+        return REMEDIES[5]
+    if 'Connection refused' in text:
+        return 'nobody listens there: is the broker running?'
+    return 'the connection was lost'

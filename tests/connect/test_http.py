@@ -1,0 +1,184 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""The HTTP interface with real clients: JSON, events, actions, roles, metrics, hostile input."""
+
+import json
+import threading
+
+import httpx
+import pytest
+from connect.detectors import Detectors
+from connect.servers import free_port, listens, wait_for
+from damadics_msgs.msg import FaultEvent
+from prometheus_client.parser import text_string_to_metric_families
+
+pytestmark = pytest.mark.ros
+OPERATOR, VIEWER = 'operator-0123456789abcdef', 'viewer-0123456789abcdef'
+
+
+class Listener(threading.Thread):
+    """A listener on the event stream, as a browser is one."""
+
+    def __init__(self, url: str, **headers: str) -> None:
+        super().__init__(daemon=True)
+        self.messages: list[tuple[str, str, dict]] = []
+        self._url, self._headers, self._over = url, headers, threading.Event()
+        self._connected = threading.Event()
+        self.start()
+        assert self._connected.wait(10.0)
+
+    def run(self) -> None:
+        number = name = ''
+        with httpx.stream('GET', self._url, headers=self._headers, timeout=30.0) as stream:
+            for line in stream.iter_lines():
+                self._connected.set()
+                if self._over.is_set():
+                    return
+                field, _, value = line.partition(': ')
+                if field == 'id':
+                    number = value
+                elif field == 'event':
+                    name = value
+                elif field == 'data':
+                    self.messages.append((number, name, json.loads(value)))
+
+    def close(self) -> None:
+        self._over.set()
+        self.join(5.0)
+
+
+@pytest.fixture(scope='module')
+def served(tmp_path_factory):
+    from conftest import alone
+    from damadics_bringup.processes import Processes
+
+    folder = tmp_path_factory.mktemp('http')
+    patch = pytest.MonkeyPatch()
+    domain = alone(patch, folder)
+    port = free_port()
+    (folder / 'tokens').write_text(f'operator {OPERATOR} Ann Example\nviewer {VIEWER}\n')
+    (folder / 'http.yaml').write_text(f'port: {port}\ntoken_file: tokens\n')
+    detectors = Detectors(domain, 'lv101', 'lv102', 'area/lv103')
+    with Processes(folder / 'logs') as processes:
+        processes.start('damadics_connect', 'http', [str(folder / 'http.yaml')])
+        log = processes.log('http')
+        assert wait_for(lambda: listens(port), 30.0), log.read_text()
+        client = httpx.Client(
+            base_url=f'http://127.0.0.1:{port}',
+            headers={'Authorization': f'Bearer {OPERATOR}'},
+            timeout=10.0,
+        )
+        assert wait_for(lambda: len(client.get('/api/fleet').json()) == 3, 20.0)
+        yield client, detectors, log
+    detectors.close()
+    patch.undo()
+
+
+def test_json_events_actions_and_metrics_of_an_alarm(served):
+    client, detectors, log = served
+    listener = Listener(f'{client.base_url}/api/events?token={VIEWER}')
+    assert wait_for(lambda: client.get('/api/valves/lv101').json()['state'] == 'healthy')
+    words = 'friction <script>alert(1)</script> \x1b[31mup'
+    stamp = detectors.judge('lv101', FaultEvent.RAISED, words, cause='friction_up')
+    told = ('event', 'raised')
+    assert wait_for(lambda: told in [(n, d.get('transition')) for _, n, d in listener.messages]), (
+        log.read_text()
+    )
+    event = next(d for _, _, d in listener.messages if d.get('transition') == 'raised')
+    assert event['stamp'] == stamp and event['confidence'] == 0.0
+    assert '\x1b' not in event['text']
+
+    assert wait_for(
+        lambda: [row['valve'] for row in client.get('/api/alarms').json()] == ['lv101']
+    )
+    row = client.get('/api/valves/lv101').json()
+    assert row['cause'] == 'friction_up' and row['ne107'] == 'out_of_specification'
+    assert row['ratio'] == 2.0 and row['stamp_utc'].endswith('Z')
+    answer = client.post('/api/acknowledge/lv101', json={'comment': 'seen\nit'})
+    assert answer.status_code == 200 and answer.json()['text'] == 'acknowledge of lv101'
+    assert detectors.calls[-1] == ('lv101', 'acknowledge', 'Ann Example', 'seen it')
+    assert wait_for(lambda: client.get('/api/valves/lv101').json()['acknowledged'])
+    refused = client.post('/api/reset/lv101', json={})
+    assert refused.status_code == 409 and refused.json()['done'] is False
+    assert client.post('/api/shelve/area/lv103', json={'duration': 60.0}).status_code == 200
+    history = client.get('/api/history', params={'valve': 'lv101'}).json()
+    assert [each['transition'] for each in history] == ['acknowledged', 'raised']
+
+    last = listener.messages[-1][0]
+    listener.close()
+    detectors.judge('lv102', FaultEvent.NEAR_MISS)
+    assert wait_for(lambda: client.get('/api/history', params={'valve': 'lv102'}).json())
+    again = Listener(f'{client.base_url}/api/events?token={VIEWER}', **{'Last-Event-ID': last})
+    missed = [('lv102', 'near_miss')]
+    assert wait_for(
+        lambda: (
+            missed == [(d['valve'], d['transition']) for _, n, d in again.messages if n == 'event']
+        )
+    )
+    again.close()
+
+    families = {f.name: f for f in text_string_to_metric_families(client.get('/metrics').text)}
+    ratio = {s.labels['valve']: s.value for s in families['damadics_ratio'].samples}
+    assert ratio['lv101'] == 2.0 and ratio['lv102'] == pytest.approx(0.1)
+    states = families['damadics_state'].samples
+    mine = [s.labels['state'] for s in states if s.labels['valve'] == 'lv101' and s.value == 1.0]
+    assert mine == ['alarm']
+    schema = client.get('/openapi.json').json()
+    assert '/api/acknowledge/{valve}' in schema['paths']
+
+
+def test_roles_and_foreign_pages(served):
+    client, detectors, log = served
+    before = len(detectors.calls)
+    bare = httpx.Client(base_url=client.base_url)
+    assert bare.get('/api/fleet').status_code == 401
+    viewer = {'Authorization': f'Bearer {VIEWER}'}
+    assert bare.get('/api/fleet', headers=viewer).status_code == 200
+    assert bare.post('/api/reset/lv101', headers=viewer, json={}).status_code == 403
+    wrong = {'Authorization': f'Bearer {VIEWER[:-1]}0'}
+    assert bare.get('/metrics', headers=wrong).status_code == 401
+    foreign = {'Origin': 'http://evil.example'}
+    assert client.post('/api/reset/lv101', headers=foreign, json={}).status_code == 403
+    assert len(detectors.calls) == before
+    words = log.read_text(errors='replace')
+    assert OPERATOR not in words and VIEWER not in words
+
+
+@pytest.mark.parametrize(
+    'body',
+    [
+        b'{',
+        b'[]',
+        b'{"occurrence": -1}',
+        b'{"occurrence": 1e999}',
+        b'{"comment": ' + b'[' * 5000 + b']' * 5000 + b'}',
+        b'{"user": "' + b'x' * 5000 + b'"}',
+        b'{"what": 1}',
+        b'\xff\xfe',
+        b'x' * 10_000_000,
+    ],
+    ids=range(9),
+)
+def test_hostile_bodies_are_refused_and_the_others_go_on(served, body):
+    client, detectors, _ = served
+    before = len(detectors.calls)
+    try:
+        answer = client.post(
+            '/api/acknowledge/lv101', content=body, headers={'Content-Type': 'application/json'}
+        )
+        assert answer.status_code in (400, 413, 422)
+        assert len(answer.text) < 20_000
+    except httpx.WriteError:
+        pass  # the connection is closed before ten megabytes are taken
+    assert len(detectors.calls) == before
+    assert client.get('/api/fleet').status_code == 200
+
+
+def test_silence_of_a_detector_is_not_health(served):
+    client, detectors, _ = served
+    detectors.silence()
+    assert wait_for(
+        lambda: {row['state'] for row in client.get('/api/fleet').json()} == {'not_monitored'}, 5.0
+    )
+    families = {f.name: f for f in text_string_to_metric_families(client.get('/metrics').text)}
+    assert {s.value for s in families['damadics_monitored'].samples} == {0.0}
