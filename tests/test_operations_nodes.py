@@ -25,6 +25,7 @@ from rosgraph_msgs.msg import Clock
 
 pytestmark = pytest.mark.ros
 PERIOD = 10_000_000  # ns
+LATE = 0.5  # s
 # the printed method, learning slowly, for it would soon take the test's throws of the stem as
 # normal; with a latch, for its alarms are to be operated
 SETTINGS = {'mode': 'paper', 'sample_rate': 100.0, 'latch': True, 'off_delay': 0.3, 'gw': 0.1}
@@ -36,17 +37,25 @@ class Valve:
     def __init__(self, peer, node: str = '') -> None:
         self.peer = peer
         self.stamp = PERIOD
+        self.next = self.zero = 0
         self.flags = peer.listen(FaultFlag, 'fault_flag', qos.FLAG)
         self.events = peer.listen(FaultEvent, 'fault_event', qos.EVENTS)
         self.reports = peer.listen(DiagnosticArray, '/diagnostics', QoSProfile(depth=100))
 
     def run(self, seconds: float, throw: bool = False) -> None:
-        """Send samples for a while."""
+        """Send samples for a while; their stamps keep up with the clock, as those of a plant."""
         end = time.monotonic() + seconds
-        while time.monotonic() < end:
-            x1 = 0.5 + (0.1 * (self.stamp // (20 * PERIOD) % 2) if throw else 0.0)
-            self.peer.send(self.stamp, 0.5, x1)
-            self.stamp += PERIOD
+        if self.stamp != self.next:  # set by the test
+            self.zero = time.monotonic() - self.stamp * 1e-9
+        while (now := time.monotonic()) < end:
+            due = now - self.zero
+            if due - self.stamp * 1e-9 > LATE:
+                self.stamp = int(due / PERIOD * 1e9) * PERIOD  # it was paused
+            while self.stamp * 1e-9 <= due:
+                x1 = 0.5 + (0.1 * (self.stamp // (20 * PERIOD) % 2) if throw else 0.0)
+                self.peer.send(self.stamp, 0.5, x1)
+                self.stamp += PERIOD
+            self.next = self.stamp
             self.peer.wait(lambda: False, PERIOD * 1e-9)
 
     def run_until(self, condition, throw: bool = False, patience: float = 15.0) -> bool:

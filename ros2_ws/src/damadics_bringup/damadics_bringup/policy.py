@@ -35,7 +35,7 @@ LIFECYCLE = (
     'get_transition_graph',
 )
 SAMPLES = ('measurement', 'estimate', 'threshold', 'fault_flag', 'fault_event')
-ALL = (*SAMPLES, 'residual', 'signature', 'fault_state')
+ALL = (*SAMPLES, 'residual', 'signature', 'fault_state', 'operator_action', 'isolation')
 OPERATE = ('acknowledge', 'reset', 'shelve', 'relearn', 'save_reference', 'load_reference')
 
 
@@ -51,7 +51,7 @@ class Rights:
 
 NODES = {  # of every valve
     'estimator': Rights(
-        ('estimate', '/diagnostics', '~/transition_event'),
+        ('estimate', 'operator_action', '/diagnostics', '~/transition_event'),
         ('measurement',),
         ('relearn', 'save_reference', 'load_reference', *(f'~/{name}' for name in LIFECYCLE)),
     ),
@@ -62,6 +62,7 @@ NODES = {  # of every valve
             'fault_flag',
             'fault_event',
             'signature',
+            'operator_action',
             '/diagnostics',
             '~/transition_event',
         ),

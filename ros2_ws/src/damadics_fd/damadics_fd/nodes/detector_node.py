@@ -3,22 +3,23 @@
 """Node `detector`: residual against threshold, fault flag and events of one actuator."""
 
 import sys
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
 
 from damadics_msgs.msg import Estimate as EstimateMessage
 from damadics_msgs.msg import FaultEvent, FaultFlag, Float64Stamped
-from rclpy.clock import Clock, ClockType
-from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
+from std_msgs.msg import Header
 
 from damadics_fd.causes import explain
-from damadics_fd.core.approximator.estimator import Estimate
+from damadics_fd.core.approximator.step import Estimate
 from damadics_fd.core.decision.alarm import NE107
 from damadics_fd.core.decision.detector import Decision, Detector, Outcome
+from damadics_fd.core.decision.events import Event
 from damadics_fd.core.modes import PHASE_INIT, PHASE_MONITOR
-from damadics_fd.core.stamps import another_run
+from damadics_fd.core.text import SENTENCE, plain
+from damadics_fd.nodes.alarm_memory import AlarmMemory
 from damadics_fd.nodes.managed import MonitoringNode
-from damadics_fd.nodes.operator import OperatorServices
+from damadics_fd.nodes.operator import OperatorActions, OperatorServices
 from damadics_fd.nodes.second_publisher import RivalWatch
 from damadics_fd.nodes.signature_publisher import SignaturePublisher, read_causes
 from damadics_fd.ros import qos
@@ -26,7 +27,7 @@ from damadics_fd.ros.arguments import check_node_arguments
 from damadics_fd.ros.conversions import event_message, read_estimate, write_flag
 from damadics_fd.ros.diagnostics import Level, Report
 from damadics_fd.ros.spin import spin
-from damadics_fd.store.alarms import AlarmStore, default_folder
+from damadics_fd.store.alarms import default_folder
 
 DESCRIPTION = 'Judge the estimates of one valve: residual against threshold, fault flag, cause.'
 EXAMPLES = """examples:
@@ -43,40 +44,17 @@ class DetectorNode(MonitoringNode):
 
     def __init__(self, arguments: list[str] | None = None) -> None:
         super().__init__('detector', 'estimate', START_ESTIMATOR, arguments)
+        self._alarms = self._folder_of(self._alarm_folder)
+        self._kept = self._folder_of(self._signature_folder, self._valve())
+        self.check_folders(alarm_folder=self._alarms, signature_folder=self._kept)
         Detector(self.settings).update(READY)
         self._core = Detector(self.settings, self._causes.classes)
-        self._decision: Decision | None = None
-        self._loaded: int | None = None  # stamp of the alarm state that was loaded
-        self._judged = self._twice = 0
-        self._phase = PHASE_INIT
-        self._number = Float64Stamped()
-        self._flag = FaultFlag()
-        self._residual = self.create_publisher(Float64Stamped, 'residual', qos.SAMPLES)
-        self._threshold = self.create_publisher(Float64Stamped, 'threshold', qos.SAMPLES)
-        self._fault_flag = self.create_publisher(FaultFlag, 'fault_flag', qos.FLAG)
-        self._fault_event = self.create_publisher(FaultEvent, 'fault_event', qos.EVENTS)
-        self._rival = RivalWatch(self, self.refuse)
-        self._signature = SignaturePublisher(
-            self,
-            self._core.signature,
-            self.actuator,
-            self.settings,
-            self._folder_of(self._signature_folder, self._valve()),
-            self._causes.limits,
-        )
-        OperatorServices(self, self._core, self._operated)
-        self._was_silent = True
         self.start()
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(min(self.watch.timeout / 5.0, HEARTBEAT), self._look, clock=steady)
-        self.create_timer(HEARTBEAT, self._publish_flag, clock=steady)
-        self.watch.subscribe(EstimateMessage, self._take, qos.SAMPLES)
-        self._publish_flag()
         self.get_logger().info(f'mode {self.settings.mode}, {self.settings.sample_rate:g} Hz')
 
     def declare_more(self) -> None:
         """Declare where alarms are kept."""
-        self._folder = self.parameters.declare(
+        self._alarm_folder = self.parameters.declare(
             'alarm_folder',
             'auto',
             'folder that keeps the alarms over a restart; "auto": one of '
@@ -94,25 +72,42 @@ class DetectorNode(MonitoringNode):
             '"auto": beside the alarms, in mode paper none; "": none',
         )
 
-    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+    def make(self) -> None:
         """Begin afresh, with the alarms from before where they are kept."""
+        made = self.entities
         self._core.reset()
-        self._store = self._make_store()
-        try:
-            saved = self._store.load() if self._store else None
-            if saved is not None:
-                self._core.load(saved)
-                self._decision = self._core.decision
-                self._loaded = int(saved['stamp'])
-                self.get_logger().info(f'alarms of before taken up from {self._store.path}')
-        except ValueError as problem:
-            self.get_logger().error(f'alarms of before are lost: {problem}')
+        self._decision: Decision | None = None
+        self._judged = self._twice = 0
+        self._phase = PHASE_INIT
+        self._was_silent = True
+        self._number = Float64Stamped()
+        self._flag = FaultFlag()
+        self._flag.header.frame_id = self.actuator
+        self._residual = made.publisher(Float64Stamped, 'residual', qos.SAMPLES)
+        self._threshold = made.publisher(Float64Stamped, 'threshold', qos.SAMPLES)
+        self._fault_flag = made.publisher(FaultFlag, 'fault_flag', qos.FLAG)
+        self._fault_event = made.publisher(FaultEvent, 'fault_event', qos.EVENTS)
+        self._rival = RivalWatch(self, made, self.refuse)
+        self._signature = SignaturePublisher(
+            self,
+            made,
+            self._core.signature,
+            self.actuator,
+            self.settings,
+            self._kept,
+            self._causes.limits,
+        )
+        path = self._alarms / f'{self._valve()}.alarm' if self._alarms else None
+        self._memory = AlarmMemory(self, self._core, path)
+        if self._memory.restore():
+            self._decision = self._core.decision
         self._signature.restore()
-        return super().on_configure(state)
-
-    def _make_store(self) -> AlarmStore | None:
-        folder = self._folder_of(self._folder)
-        return AlarmStore(folder / f'{self._valve()}.alarm.json') if folder else None
+        actions = OperatorActions(self, made, self.actuator)
+        OperatorServices(made, actions, self._core, self._operated)
+        made.timer(min(self.watch.timeout / 5.0, HEARTBEAT), self._look)
+        made.timer(HEARTBEAT, self._beat)
+        self.watch.subscribe(EstimateMessage, self._take, qos.SAMPLES)
+        self._publish_flag()
 
     def _folder_of(self, given: str, own: str = '') -> Path | None:
         """Return the folder that a parameter means; `own` is the part of this valve in `auto`."""
@@ -124,67 +119,87 @@ class DetectorNode(MonitoringNode):
         return self.get_namespace().strip('/').replace('/', '__') or 'root'
 
     def _take(self, message: EstimateMessage) -> None:
+        decision = self._judge(message)
+        if decision is not None:
+            self._publish(decision, message.header)
+            self._keep(decision, message.header)
+
+    def _judge(self, message: EstimateMessage) -> Decision | None:
+        """Judge an estimate; None where it is not to be judged."""
         if not self.active:
-            return
+            return None
         estimate = read_estimate(message)
-        before = self._decision
-        if self._loaded is not None:
-            if another_run(self._loaded, estimate.stamp):
-                self.get_logger().info('time begins anew: the alarms belong to another run')
-                self._core.reset()
-            self._loaded = None
-        elif before is not None and estimate.stamp == before.stamp:
-            self._twice += 1  # two estimators send
-            return
+        self._memory.begin(estimate.stamp)
         self._signature.begin(estimate.stamp)
+        before = self._decision
+        if self._judged and before and estimate.stamp == before.stamp:
+            self._twice += 1  # two estimators send
+            return None
         learns = self._phase == PHASE_MONITOR and estimate.phase < PHASE_MONITOR
         if learns and not self._was_silent:
             self._core.signature.relearn()  # somebody had the valve learned afresh
         self._phase = estimate.phase
-        decision = self._decision = self._core.update(estimate)
         self._judged += 1
-        header = message.header
+        return self._core.update(estimate)
+
+    def _publish(self, decision: Decision, header: Header) -> None:
+        """Publish residual and threshold, and the flag where it has changed."""
+        before, self._decision = self._decision, decision
         self._number.header = self._flag.header = header
         self._number.data = decision.residual
         self._residual.publish(self._number)
         self._number.data = decision.threshold
         self._threshold.publish(self._number)
-        if before is None or self._was_silent or decision[5:8] != before[5:8]:
-            self._was_silent = False
+        turned = self._was_silent and self._look()
+        if not turned and (before is None or shown(decision) != shown(before)):
             self._publish_flag()
             self.diagnostics.check()
+
+    def _keep(self, decision: Decision, header: Header) -> None:
+        """Tell transitions, and keep alarm and signature for a restart."""
         if decision.events:
             self._tell(decision.events, header.frame_id)
         self._signature.update(header, decision.stamp)
 
-    def _tell(self, events: Any, frame_id: str, more: str = '') -> None:
-        """Publish transitions, and keep the alarm for a restart."""
+    def _tell(self, events: Iterable[Event], frame_id: str, more: str = '') -> None:
         for event in events:
             message = event_message(explain(event, self._causes, self.actuator), frame_id)
-            message.text += more
+            message.text = plain(message.text + more, SENTENCE)
             self._fault_event.publish(message)
-        if self._store:
-            try:
-                self._store.save(self._core.save())
-            except OSError as problem:
-                self.get_logger().error(
-                    f'the alarm would not survive a restart: {problem}', throttle_duration_sec=60.0
-                )
+        self._memory.keep()
 
-    def _look(self) -> None:
-        """Turn to "not monitoring" when the input falls silent."""
-        if not self._was_silent and (self.watch.silent or not self.active):
-            self._was_silent = True
+    @property
+    def _blind(self) -> bool:
+        """Whether the latest judgement says nothing about now."""
+        return (
+            not self.active
+            or self.watch.silent
+            or self.watch.stale
+            or self.entities.fails('estimate')
+        )
+
+    def _look(self) -> bool:
+        """Turn to "not monitoring" when the input falls silent or behind, and back."""
+        turned = self._was_silent != self._blind
+        if turned:
+            self._was_silent = not self._was_silent
             self._publish_flag()
             self.diagnostics.check()
+        return turned
+
+    def _beat(self) -> None:
+        if self._memory.problem:
+            self._memory.keep()
+        self._publish_flag()
 
     def _publish_flag(self) -> None:
+        flag = self._flag
         if self._decision is not None:
-            write_flag(self._decision, self._flag)
-        if self.watch.silent or not self.active:
-            self._flag.state = FaultFlag.STATE_NOT_MONITORING
-            self._flag.level = self._flag.level or FaultFlag.NE107_FUNCTION_CHECK
-        self._fault_flag.publish(self._flag)
+            write_flag(self._decision, flag)
+        if self._blind and flag.state != FaultFlag.STATE_UNKNOWN:
+            flag.state = FaultFlag.STATE_NOT_MONITORING
+            flag.level = flag.level or FaultFlag.NE107_FUNCTION_CHECK
+        self._fault_flag.publish(flag)
         self._rival.sent()
 
     def _operated(self, outcome: Outcome, remark: str) -> None:
@@ -210,8 +225,13 @@ class DetectorNode(MonitoringNode):
             'Estimates judged': self._judged,
             'Estimates received twice': self._twice,
             'NE 107': NE107[decision.level],
+            **self._memory.values,
             **self._signature.values,
         }
+        if self._memory.problem:
+            return Level.ERROR, self._memory.problem, values
+        if decision.state == FaultFlag.STATE_UNKNOWN:
+            return Level.ERROR, LOST, values
         if self.watch.silent:
             return Level.ERROR, 'estimates have stopped: not monitoring', values
         if decision.fault:
@@ -220,7 +240,22 @@ class DetectorNode(MonitoringNode):
             return Level.WARN, 'estimates arrive twice: end one of the estimators', values
         if decision.level:
             return Level.WARN, f'{NE107[decision.level]}: no faults are reported', values
+        if self._signature.problem:
+            return Level.WARN, self._signature.problem, values
         return Level.OK, 'no fault flagged', values
+
+
+LOST = 'the alarm of before is lost: look at the valve, then acknowledge'
+
+
+def shown(decision: Decision) -> tuple[bool, int, int]:
+    """
+    Return what of a decision is told at once when it changes.
+
+    :param decision: the decision.
+    :return: fault, state and level.
+    """
+    return decision.fault, decision.state, decision.level
 
 
 def main(args: list[str] | None = None) -> int:

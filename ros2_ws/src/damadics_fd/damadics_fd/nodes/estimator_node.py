@@ -5,20 +5,21 @@
 import math
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from damadics_msgs.msg import Estimate as EstimateMessage
-from damadics_msgs.msg import Measurement
+from damadics_msgs.msg import Measurement, OperatorAction
 from damadics_msgs.srv import Reference as ReferenceService
 from damadics_msgs.srv import Relearn
-from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 
 from damadics_fd.core.decision.alarm import NE107
 from damadics_fd.core.quality import EXPLANATIONS
 from damadics_fd.core.scada.estimator import estimator_for
+from damadics_fd.core.text import plain
+from damadics_fd.nodes.frozen_position import FrozenPosition
 from damadics_fd.nodes.managed import MonitoringNode
-from damadics_fd.nodes.operator import signed
+from damadics_fd.nodes.operator import OperatorActions
 from damadics_fd.ros import qos
 from damadics_fd.ros.arguments import check_node_arguments
 from damadics_fd.ros.conversions import sample, write_estimate
@@ -28,6 +29,7 @@ from damadics_fd.store.references import (
     NoReferenceError,
     Reference,
     load_reference,
+    reference_path,
     save_reference,
 )
 
@@ -39,6 +41,7 @@ EXAMPLES = """examples:
 START_PLANT = 'start a driver of the valve, or the simulator: ros2 run damadics_plant plant'
 READY = (1, 0.5, 0.5, 0.0, 0.0, 20.0, 0.0, 0.0)  # a sample that makes the core compile
 MONITORING = ('monitor', 'paper')  # phases in which decisions count
+RETRY = 10.0  # s of wall time between two tries to keep what was learned
 RECENT = 1.5  # s of wall time for which a refused sample is told
 
 
@@ -47,39 +50,49 @@ class EstimatorNode(MonitoringNode):
 
     def __init__(self, arguments: list[str] | None = None) -> None:
         super().__init__('estimator', 'measurement', START_PLANT, arguments)
+        self.check_folders(reference=self._path.parent if self._path else None)
         estimator_for(self.settings).update(*READY)
         self._core = estimator_for(self.settings)
-        self._message = EstimateMessage()
-        self._last = self._core.phase
-        self._refused_at = -math.inf  # monotonic time of the last refused sample [s]
-        self._publisher = self.create_publisher(EstimateMessage, 'estimate', qos.SAMPLES)
-        self.create_service(Relearn, 'relearn', self._relearn)
-        self.create_service(ReferenceService, 'save_reference', self._save_service)
-        self.create_service(ReferenceService, 'load_reference', self._load_service)
-        self.watch.subscribe(Measurement, self._take, qos.SAMPLES)
         self.start()
         self.get_logger().info(f'mode {self.settings.mode}, {self.settings.sample_rate:g} Hz')
 
     def declare_more(self) -> None:
         """Declare where the reference is kept."""
-        self._path = self.parameters.declare(
+        path = self.parameters.declare(
             'reference',
             '',
             'file with what was learned, without ".a.json"; loaded at the start, '
             'written when learning ends; "": learn at every start',
         )
+        self._path = Path(path).expanduser().absolute() if path else None
 
-    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+    def make(self) -> None:
         """Begin afresh, with the reference where there is one."""
+        made = self.entities
         self._core.reset()
+        self._message = EstimateMessage()
+        self._last = self._core.phase
+        self._refused_at = -math.inf  # monotonic time of the last refused sample [s]
+        self._unsaved = ''  # why what was learned is not kept
+        self._frozen = FrozenPosition()
+        self._publisher = made.publisher(EstimateMessage, 'estimate', qos.SAMPLES)
+        self._actions = OperatorActions(self, made, self.actuator)
+        made.service(Relearn, 'relearn', self._relearn)
+        made.service(ReferenceService, 'save_reference', self._save_service)
+        made.service(ReferenceService, 'load_reference', self._load_service)
         if self._path:
             done, text = self._load(self._path)
-            (self.get_logger().info if done else self.get_logger().warning)(text)
-        return super().on_configure(state)
+            if done:
+                self.get_logger().info(text)
+            else:
+                self.get_logger().warning(text)
+            made.timer(RETRY, self._save_again)
+        self.watch.subscribe(Measurement, self._take, qos.SAMPLES)
 
     def _take(self, measurement: Measurement) -> None:
         if not self.active:
             return
+        self._frozen.note(measurement.header.stamp, measurement.cv, measurement.x1)
         estimate = self._core.update(*sample(measurement))
         if estimate is None:
             self._refused_at = time.monotonic()
@@ -94,56 +107,92 @@ class EstimatorNode(MonitoringNode):
             self._last = phase
             self.diagnostics.check()
             if learned and self._path:
-                self.get_logger().info(self._save(self._path, 'live')[1])
+                self._keep(self._path)
 
-    def _save(self, path: str, source: str) -> tuple[bool, str]:
+    def _keep(self, path: Path) -> None:
+        """Keep what was learned; where that fails, it is told and tried again."""
+        done, text = self._save(path)
+        self._unsaved = '' if done else text
+        log = self.get_logger()
+        if done:
+            log.info(text)
+        else:
+            log.error(text, throttle_duration_sec=60.0)
+
+    def _save_again(self) -> None:
+        if self._unsaved and self._path and self._core.phase == 'monitor':
+            self._keep(self._path)
+
+    def _save(self, path: Path) -> tuple[bool, str]:
         try:
             reference = Reference(
                 self.actuator,
                 self._core.learned(),
                 self.settings.to_dict(),
-                source=source,
+                source='live',
                 last_stamp=int(self._core.quality[0].stamp),
             )
-            return True, f'reference saved: {save_reference(Path(path).expanduser(), reference)}'
+            return True, f'reference saved: {save_reference(path, reference)}'
         except (ValueError, OSError) as problem:
             return False, f'reference not saved: {problem}'
 
-    def _load(self, path: str) -> tuple[bool, str]:
+    def _load(self, path: Path) -> tuple[bool, str]:
         try:
-            reference = load_reference(Path(path).expanduser(), self.actuator, self.settings)
+            reference = load_reference(path, self.actuator, self.settings)
             self._core.restore(reference.learned)
         except NoReferenceError as problem:
             return False, f'no reference, the valve is learned: {problem}'
         except ValueError as problem:
             return False, f'reference refused, the valve is learned: {problem}'
-        return True, f'reference loaded: {path}, {reference.source}'
+        return True, f'reference loaded: {path}, {plain(reference.source)}'
 
-    def _save_service(self, request: Any, response: Any) -> Any:
-        done = self._of_path(request, lambda path: self._save(path, 'live'))
-        response.success, response.message = done
-        return response
+    def _save_service(
+        self, request: ReferenceService.Request, response: ReferenceService.Response
+    ) -> ReferenceService.Response:
+        return self._of_path(OperatorAction.SAVE_REFERENCE, request, response, self._save)
 
-    def _load_service(self, request: Any, response: Any) -> Any:
-        response.success, response.message = self._of_path(request, self._load)
+    def _load_service(
+        self, request: ReferenceService.Request, response: ReferenceService.Response
+    ) -> ReferenceService.Response:
+        self._of_path(OperatorAction.LOAD_REFERENCE, request, response, self._load)
         self.diagnostics.publish()
         return response
 
-    def _of_path(self, request: Any, act: Any) -> tuple[bool, str]:
-        path = request.path or self._path
-        if not path:
-            return False, 'no file: give path, or set the parameter reference'
-        done, text = act(path)
-        self.get_logger().info(text)
-        return done, text
+    def _of_path(
+        self,
+        action: int,
+        request: ReferenceService.Request,
+        response: ReferenceService.Response,
+        act: Callable[[Path], tuple[bool, str]],
+    ) -> ReferenceService.Response:
+        try:
+            path = reference_path(request.path, self._path)
+        except ValueError as problem:
+            response.message = str(problem)
+        else:
+            response.success, response.message = act(path)
+        self._actions.tell(
+            action,
+            response.success,
+            response.message,
+            stamp=int(self._core.quality[0].stamp),
+        )
+        return response
 
-    def _relearn(self, request: Any, response: Any) -> Any:
+    def _relearn(self, request: Relearn.Request, response: Relearn.Response) -> Relearn.Response:
         if self.settings.mode == 'paper':
             response.message = 'mode paper learns all the time: there is nothing to learn anew'
-            return response
-        self._core.relearn(after_repair=True)
-        response.success, response.message = True, 'learning anew: faults are not reported'
-        self.get_logger().info(response.message + signed(request.user, request.comment))
+        else:
+            self._core.relearn(after_repair=True)
+            response.success, response.message = True, 'learning anew: faults are not reported'
+        self._actions.tell(
+            OperatorAction.RELEARN,
+            response.success,
+            response.message,
+            stamp=int(self._core.quality[0].stamp),
+            user=request.user,
+            comment=request.comment,
+        )
         self.diagnostics.publish()
         return response
 
@@ -166,6 +215,10 @@ class EstimatorNode(MonitoringNode):
         if time.monotonic() - self._refused_at < RECENT:
             reason = self._core.last_rejection.split(':')[0]
             return Level.WARN, f'samples refused: {EXPLANATIONS[reason]}', values
+        if self._unsaved:
+            return Level.WARN, self._unsaved, values
+        if good and self._frozen.problem:
+            return Level.WARN, self._frozen.problem, values
         return Level.OK if good else Level.WARN, self._core.status, values
 
     def _class_of(self, failed: str, good: bool) -> str:

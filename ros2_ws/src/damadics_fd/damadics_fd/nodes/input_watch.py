@@ -4,16 +4,33 @@
 
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import Protocol, TypeVar
 
-from rclpy.clock import Clock, ClockType
+from rclpy.event_handler import QoSMessageLostInfo as Lost
+from rclpy.event_handler import QoSRequestedIncompatibleQoSInfo as Incompatible
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import QoSPolicyKind, QoSProfile
+from std_msgs.msg import Header
+
+from damadics_fd.core.freshness import ForwardJumps, Freshness
+from damadics_fd.core.stamps import SECOND
+from damadics_fd.core.text import NAME, plain
+from damadics_fd.ros.entities import Entities
 
 FIRST_WORD = 0.8  # s of wall time after the start
 NEXT_WORDS = 30.0  # s
+HISTORY = 3600.0  # s; older samples are a replay
 PERIODS = 3.0  # slower samples than the timeout allows for may be late by so many periods
+
+
+class Stamped(Protocol):
+    """A message with a header."""
+
+    header: Header
+
+
+M = TypeVar('M', bound=Stamped)
 
 
 class InputWatch:
@@ -31,9 +48,17 @@ class InputWatch:
     """
 
     def __init__(
-        self, node: Node, topic: str, command: str, timeout: float, period: float = 0.0
+        self,
+        node: Node,
+        entities: Entities,
+        topic: str,
+        command: str,
+        timeout: float,
+        period: float = 0.0,
     ) -> None:
         self.timeout = timeout
+        self.max_age = float('inf')  # [s] from which a judgement is not healthy
+        self._entities = entities
         self._node = node
         self._topic = topic
         self._command = command
@@ -44,32 +69,41 @@ class InputWatch:
         self._ros = 0  # ROS time of the last message [ns]
         self._ros_seen = 0
         self._ros_moved = 0.0  # monotonic time of the last motion of ROS time [s]
+        self._fresh = Freshness(self._simulated)
+        self._far: Callable[[], int] = lambda: 0  # messages whose stamp alone ran far ahead
+        self._tag = ''  # that came last
         self._lost = 0
         self._mismatch = ''
-        self._timer = node.create_timer(
-            FIRST_WORD, self._remind, clock=Clock(clock_type=ClockType.STEADY_TIME)
-        )
+        self._timer = entities.timer(FIRST_WORD, self._remind)
 
-    def subscribe(self, kind: type, take: Callable[[Any], None], profile: QoSProfile) -> None:
+    def subscribe(self, kind: type[M], take: Callable[[M], None], profile: QoSProfile) -> None:
         """
         Subscribe to the input.
 
-        :param kind: type of its messages.
-        :param take: called with each message.
+        :param kind: type of its messages, which have a header.
+        :param take: called with each message; not with one whose stamp alone runs far ahead.
         :param profile: quality of service; no deadline, for a publisher that offers none would
             then not be heard at all.
         """
+        jumps: ForwardJumps[M] = ForwardJumps()
+        self._far = lambda: jumps.refused
 
-        def arrived(message: Any) -> None:
-            self._wall = time.monotonic()
+        def arrived(message: M) -> None:
+            self._wall = now = time.monotonic()
             if self._simulated:
                 self._ros = self._clock.now().nanoseconds
-            take(message)
+            time_of = message.header.stamp
+            if message.header.frame_id != self._tag:
+                self._tag = message.header.frame_id = plain(message.header.frame_id, NAME)
+            for admitted in jumps.admit(time_of.sec * SECOND + time_of.nanosec, message, now):
+                stamp = admitted.header.stamp
+                self._fresh.heard(stamp.sec * SECOND + stamp.nanosec, now)
+                take(admitted)
 
         events = SubscriptionEventCallbacks(
             incompatible_qos=self._incompatible, message_lost=self._count_lost
         )
-        self._node.create_subscription(kind, self._topic, arrived, profile, event_callbacks=events)
+        self._entities.subscription(kind, self._topic, arrived, profile, events)
 
     @property
     def age(self) -> float:
@@ -89,6 +123,34 @@ class InputWatch:
     def silent(self) -> bool:
         """Whether nothing has arrived for longer than the timeout."""
         return self.age > max(self.timeout, self._slow)
+
+    @property
+    def lag(self) -> float:
+        """Age of the newest sample by its stamp [s]; below 0 in the future, 0 before any."""
+        if self._wall is None:
+            return 0.0
+        return self._fresh.age(self._clock.now().nanoseconds, time.monotonic())
+
+    @property
+    def stale(self) -> bool:
+        """Whether the newest sample is too old for a judgement to be healthy."""
+        return self.lag > max(self.max_age, self.timeout)
+
+    @property
+    def lateness(self) -> str:
+        """What the stamps of the samples say against the clock."""
+        lag = self.lag
+        if lag < 0.0:
+            return f'samples are stamped {-lag:.3g} s in the future: set the clocks right'
+        if lag > HISTORY:
+            return (
+                f'samples are {lag / 86400.0:.3g} days old: for a replay publish /clock and set '
+                'use_sim_time'
+            )
+        return (
+            f'samples are {lag:.3g} s old when they are judged: this machine is too slow, or a '
+            'clock is wrong'
+        )
 
     @property
     def publishers(self) -> int:
@@ -113,6 +175,8 @@ class InputWatch:
         age = self.age
         return {
             'Age of the last message (s)': age if age < float('inf') else 'never',
+            'Lag of its stamp (s)': self.lag,
+            'Messages stamped far ahead': self._far(),
             'Publishers': self.publishers,
             'Messages lost': self._lost,
         }
@@ -121,7 +185,7 @@ class InputWatch:
     def _name(self) -> str:
         return self._node.resolve_topic_name(self._topic)
 
-    def _incompatible(self, event: Any) -> None:
+    def _incompatible(self, event: Incompatible) -> None:
         policy = QoSPolicyKind(event.last_policy_kind).name.lower()
         self._mismatch = (
             f'a publisher of {self._name} offers an incompatible quality of service ({policy}): '
@@ -129,7 +193,7 @@ class InputWatch:
         )
         self._node.get_logger().error(self._mismatch)
 
-    def _count_lost(self, event: Any) -> None:
+    def _count_lost(self, event: Lost) -> None:
         self._lost = event.total_count
         self._node.get_logger().warning(
             f'{self._lost} messages lost on {self._name}: this machine is too slow',

@@ -9,6 +9,8 @@ from damadics_msgs.msg import FaultFlag
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
+from damadics_fd.ros.entities import Entities
+
 NEWCOMER = 4.0  # s after its start in which a node gives way to the one that was there
 
 
@@ -19,16 +21,17 @@ class RivalWatch:
     A dead node, which discovery keeps for a while, sends none and is no rival.
 
     :param node: the node.
+    :param entities: of the node.
     :param refuse: called with the cause where the node has to give way.
     """
 
-    def __init__(self, node: Node, refuse: Callable[[str], None]) -> None:
+    def __init__(self, node: Node, entities: Entities, refuse: Callable[[str], None]) -> None:
         self._node = node
         self._refuse = refuse
         self._since = time.monotonic()
         self._sent = self._heard = 0
         profile = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
-        node.create_subscription(FaultFlag, 'fault_flag', self._hear, profile)
+        entities.subscription(FaultFlag, 'fault_flag', self._hear, profile)
 
     def sent(self) -> None:
         """Note that the node itself has sent a flag."""

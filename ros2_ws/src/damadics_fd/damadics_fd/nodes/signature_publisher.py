@@ -5,19 +5,21 @@
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from damadics_msgs.msg import Signature as SignatureMessage
 from rclpy.node import Node
 from std_msgs.msg import Header
 
 from damadics_fd.causes import CauseTable, CauseTableError, load_causes
+from damadics_fd.core.record import Saved
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.signature.cause import own_alarm_ready
 from damadics_fd.core.signature.signature import Signature
 from damadics_fd.core.stamps import another_run
 from damadics_fd.ros import qos
+from damadics_fd.ros.entities import Entities
 from damadics_fd.ros.spin import StartError
+from damadics_fd.store.file_names import file_name
 from damadics_fd.store.references import (
     NoReferenceError,
     Reference,
@@ -47,7 +49,11 @@ class SignaturePublisher:
     """
     Publisher of `signature`, about once a second of measurement time and on every change.
 
+    What it keeps in files is an auxiliary: where that fails, it is told and tried again, and the
+    valve is monitored as before.
+
     :param node: the detector.
+    :param entities: of the node.
     :param signature: of its core.
     :param actuator: tag; also names the files.
     :param settings: that the signature was learned with.
@@ -58,6 +64,7 @@ class SignaturePublisher:
     def __init__(
         self,
         node: Node,
+        entities: Entities,
         signature: Signature,
         actuator: str,
         settings: Settings,
@@ -73,10 +80,11 @@ class SignaturePublisher:
         self._trend: TrendFile | None = None
         self._outlook: list[Outlook] = []
         self._restored: int | None = None  # stamp of the reference that was taken up
-        self._saved: dict[str, Any] = {}
+        self._saved: Saved = {}
+        self.problem = ''  # why signature or trend are not kept
         self._last: tuple[int, ...] = ()
         self._next = 0
-        self._publisher = node.create_publisher(SignatureMessage, 'signature', qos.FLAG)
+        self._publisher = entities.publisher(SignatureMessage, 'signature', qos.FLAG)
 
     def restore(self) -> None:
         """Take up the signature of before, where there is a good one."""
@@ -111,8 +119,10 @@ class SignaturePublisher:
     def values(self) -> dict[str, str]:
         """Cause and outlook of each trend, for the diagnostics."""
         view = self._signature.view()
+        unreadable = self._trend.unreadable if self._trend else 0
         return {
             'Cause': view.cause.replace('_', ' '),
+            **({'Lines of the trend unreadable': str(unreadable)} if unreadable else {}),
             **{f'Trend of {o.quantity}': o.sentence() for o in self._outlook},
         }
 
@@ -129,17 +139,24 @@ class SignaturePublisher:
             return
         self._last, self._next = present, stamp + PERIOD
         if self._folder and s.verified:
-            try:
-                self._keep(self._folder, stamp)
-            except OSError as problem:
-                self._node.get_logger().error(
-                    f'signature and trend are not kept: {problem}; check folder and free space',
-                    throttle_duration_sec=60.0,
-                )
-        self._outlook = self._trend.outlook(self._limits, stamp * 1e-9) if self._trend else []
+            self._contained(self._folder, stamp)
         message = signature_message(self._signature, header)
         write_outlook(self._outlook, message)
         self._publisher.publish(message)
+
+    def _contained(self, folder: Path, stamp: int) -> None:
+        try:
+            self._keep(folder, stamp)
+            trend = self._trend
+            self._outlook = trend.outlook(self._limits, stamp * 1e-9) if trend else []
+        except Exception as problem:
+            self._trend, self._outlook = None, []  # opened anew next time
+            self.problem = f'signature and trend are not kept: {problem}'
+            self._node.get_logger().error(
+                f'{self.problem}; check folder and free space', throttle_duration_sec=60.0
+            )
+        else:
+            self.problem = ''
 
     def _keep(self, folder: Path, stamp: int) -> None:
         s = self._signature.state[0]
@@ -164,7 +181,7 @@ class SignaturePublisher:
             self._trend.add(stamp, s.now.tolist(), s.now_std.tolist())
 
     def _path(self, folder: Path) -> Path:
-        return folder / f'{self._actuator}.signature'
+        return folder / f'{file_name(self._actuator)}.signature'
 
 
 def signature_message(signature: Signature, header: Header) -> SignatureMessage:

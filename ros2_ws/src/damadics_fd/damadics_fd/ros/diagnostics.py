@@ -6,10 +6,13 @@ from collections.abc import Callable, Mapping
 from enum import IntEnum
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
+from damadics_fd.core.text import SENTENCE, plain
 from damadics_fd.ros import qos
+from damadics_fd.ros.entities import Entities
+
+PERIOD = 1.0  # s of wall time
 
 
 class Level(IntEnum):
@@ -28,21 +31,22 @@ class Diagnostics:
     Publisher of one diagnostic status.
 
     :param node: the node that is reported on.
+    :param entities: of the node.
     :param hardware_id: tag of the actuator.
     :param report: returns level, one sentence and key-values, units in the keys; it is called
         once a second of wall time, so that it works while simulated time stands still.
     """
 
-    def __init__(self, node: Node, hardware_id: str, report: Callable[[], Report]) -> None:
+    def __init__(
+        self, node: Node, entities: Entities, hardware_id: str, report: Callable[[], Report]
+    ) -> None:
         self._node = node
         self._name = f'{node.get_fully_qualified_name().lstrip("/")}: {hardware_id}'
         self._hardware_id = hardware_id
         self._report = report
         self._level: Level | None = None
-        self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', qos.DIAGNOSTICS)
-        self._timer = node.create_timer(
-            1.0, self.publish, clock=Clock(clock_type=ClockType.STEADY_TIME)
-        )
+        self._publisher = entities.publisher(DiagnosticArray, '/diagnostics', qos.DIAGNOSTICS)
+        entities.timer(PERIOD, self.publish)
 
     def publish(self) -> None:
         """Publish the present status."""
@@ -51,7 +55,7 @@ class Diagnostics:
         status = DiagnosticStatus(
             level=bytes([level]),
             name=self._name,
-            message=message,
+            message=plain(message, SENTENCE),
             hardware_id=self._hardware_id,
             values=[KeyValue(key=key, value=_text(value)) for key, value in values.items()],
         )
@@ -66,4 +70,4 @@ class Diagnostics:
 
 
 def _text(value: object) -> str:
-    return f'{value:.6g}' if isinstance(value, float) else str(value)
+    return f'{value:.6g}' if isinstance(value, float) else plain(str(value), SENTENCE)

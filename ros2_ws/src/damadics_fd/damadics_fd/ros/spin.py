@@ -5,11 +5,13 @@
 import gc
 import signal
 import sys
+import time
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
 import rclpy
 from rclpy.clock import Clock, ClockType
+from rclpy.executors import ExternalShutdownException
 from rclpy.experimental import EventsExecutor
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
@@ -49,9 +51,15 @@ def spin_until(done: Callable[[], bool], executor: EventsExecutor, nodes: Sequen
             timer = nodes[0].create_timer(
                 LOOK, lambda ended=ended: ended.set_result(None) if done() else None, clock=steady
             )
-            # Never untimed: an untimed spin of this executor does not return in some builds. Many
-            # callbacks a call, where spin_once returns after each.
-            executor.spin_until_future_complete(ended, LONG)
+            try:
+                # Never untimed: an untimed spin of this executor does not return in some builds.
+                # Many callbacks a call, where spin_once returns after each.
+                executor.spin_until_future_complete(ended, LONG)
+            except ExternalShutdownException:
+                raise
+            except Exception as error:  # of rclpy itself: the other nodes must go on
+                nodes[0].get_logger().error(f'internal error: {type(error).__name__}: {error}')
+                time.sleep(LOOK)
             nodes[0].destroy_timer(timer)
 
 

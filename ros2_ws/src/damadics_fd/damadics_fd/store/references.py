@@ -15,6 +15,8 @@ from pathlib import Path
 
 from damadics_fd.core.record import Saved
 from damadics_fd.core.settings import Settings
+from damadics_fd.core.text import plain
+from damadics_fd.ros.arguments import state_folder
 from damadics_fd.store.slots import NAMES, number_of, read_slots, slot_file, write_slot
 
 try:
@@ -23,6 +25,7 @@ except PackageNotFoundError:  # run from a source tree that was never built
     VERSION = 'unknown'
 FORMAT = 'damadics_fd reference 1'
 LATEST = 2**31 * 10**9  # ns; what fits into the stamp of a message
+LONGEST = 1000  # characters of a path that is asked for
 CLOCK_TOLERANCE = 86400.0  # s; a file from later than that is from a wrong clock
 # settings that the learned numbers depend on; the others may change after learning
 BINDING = (
@@ -120,6 +123,29 @@ def load_reference(
         except ValueError as error:
             reasons[slot.file] = f': {error}'
     raise ReferenceFileError('; '.join(f'{file}{text}' for file, text in reasons.items()))
+
+
+def reference_path(asked: str, configured: Path | None) -> Path:
+    """
+    Return the file that a request means; it stays below the folder of the valve's reference.
+
+    :param asked: name or path, '' for the configured one.
+    :param configured: absolute path of the parameter `reference`; None where it is not set: then
+        the folder is `references` of the user.
+    :return: absolute path, without slot and suffix.
+    :raises ValueError: where it is outside that folder, or there is none.
+    """
+    folder = configured.parent if configured else state_folder() / 'references'
+    if not asked:
+        if configured is None:
+            raise ValueError('no file: give path, or set the parameter reference')
+        return configured
+    if len(asked) > LONGEST or not asked.isprintable():
+        raise ValueError(f'this is no path: give a name below {folder}')
+    path = (folder / asked).resolve()
+    if not path.is_relative_to(folder.resolve()) or path == folder.resolve():
+        raise ValueError(f'{plain(asked)} is not below {folder}: give a name without folders')
+    return path
 
 
 def _reference(content: Saved) -> Reference:

@@ -116,17 +116,25 @@ def sync_folder(folder: Path) -> None:
         os.close(number)
 
 
-def set_aside(file: Path) -> Path:
+def set_aside(file: Path, keep: bool = False) -> Path:
     """
     Keep what cannot be read under another name, for a person to look at.
 
     :param file: what is damaged: file, link, folder.
+    :param keep: a file also stays where it is until the next save replaces it: a crash in between
+        must not make it look as if there had never been one. What is no file gives way at once.
     :return: its new path, beside the old one.
     :raises OSError: where the folder cannot be written.
     """
     stem = f'{file.name}.bad-'
     target = file.with_name(f'{stem}{time.time_ns()}')
-    file.rename(target)
+    if keep and stat.S_ISREG(file.lstat().st_mode):
+        try:
+            os.link(file, target)
+        except OSError:  # a file system without links
+            file.rename(target)
+    else:
+        file.rename(target)
     older = sorted(p for p in file.parent.iterdir() if p.name.startswith(stem) and p.is_file())
     for path in older[:-KEPT_ASIDE]:
         path.unlink(missing_ok=True)

@@ -1,0 +1,51 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Tell live that a position stands still while its control value moves (IN-4)."""
+
+import math
+
+from builtin_interfaces.msg import Time
+
+LONG = 3.0  # s
+MOVED = 0.15  # of the range of the control value
+STILL = 1e-4  # of the stroke
+
+
+class FrozenPosition:
+    """Watch one position against its control value."""
+
+    def __init__(self) -> None:
+        self._place = math.nan
+        self._since = 0.0  # stamp [s]
+        self._low = self._high = math.nan
+        self._now = 0.0
+
+    def note(self, stamp: Time, cv: float, x1: float) -> None:
+        """
+        Take a measurement.
+
+        :param stamp: of it.
+        :param cv: control value [1].
+        :param x1: stem position [1].
+        """
+        now = stamp.sec + 1e-9 * stamp.nanosec
+        if abs(x1 - self._place) <= STILL and now >= self._since:
+            self._now = now
+            if cv < self._low:
+                self._low = cv
+            elif cv > self._high:
+                self._high = cv
+        else:
+            self._place, self._since, self._now = x1, now, now
+            self._low = self._high = cv
+
+    @property
+    def problem(self) -> str:
+        """What is wrong, '' if nothing."""
+        still, moved = self._now - self._since, self._high - self._low
+        if still < LONG or not moved > MOVED:
+            return ''
+        return (
+            f'the position has not moved for {still:.0f} s while the control value moved by '
+            f'{100.0 * moved:.0f} %: stem or position sensor'
+        )

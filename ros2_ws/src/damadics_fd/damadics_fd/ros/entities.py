@@ -1,0 +1,157 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""What a node has made: made together, released together; an error in a callback ends nothing."""
+
+from collections.abc import Callable
+from typing import TypeVar
+
+from rclpy.clock import Clock, ClockType
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import QoSProfile
+from rclpy.timer import Timer
+
+REQUESTS = QoSProfile(depth=1000)  # that may wait for their answer
+TOLD_EVERY = 10.0  # s
+
+M = TypeVar('M')
+Request = TypeVar('Request')
+Response = TypeVar('Response')
+
+
+class Entities:
+    """
+    Publishers, subscriptions, services and timers of a node.
+
+    An exception that leaves a callback would end the process, with every other node in it. It is
+    logged, stands in `problem` until the callback succeeds, and the node goes on. A callback that
+    was queued when its entity was released does nothing.
+
+    :param node: the node.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._failing: dict[str, str] = {}
+        self._undo: list[Callable[[], object]] = []
+        self._alive = True
+
+    @property
+    def problem(self) -> str:
+        """What a callback has failed with, '' where all is well."""
+        return next(iter(self._failing.values()), '')
+
+    def fails(self, name: str) -> bool:
+        """
+        Tell whether a callback raised when it was called last.
+
+        :param name: topic or service.
+        :return: True if so.
+        """
+        return name in self._failing
+
+    def publisher(self, kind: type, topic: str, profile: QoSProfile) -> Publisher:
+        """
+        Make a publisher.
+
+        :param kind: type of its messages.
+        :param topic: its topic.
+        :param profile: quality of service.
+        :return: the publisher.
+        """
+        made = self._node.create_publisher(kind, topic, profile)
+        self._undo.append(lambda: self._node.destroy_publisher(made))
+        return made
+
+    def subscription(
+        self,
+        kind: type,
+        topic: str,
+        take: Callable[[M], None],
+        profile: QoSProfile,
+        events: SubscriptionEventCallbacks | None = None,
+    ) -> None:
+        """
+        Make a subscription.
+
+        :param kind: type of its messages.
+        :param topic: its topic.
+        :param take: called with each message.
+        :param profile: quality of service.
+        :param events: of the middleware.
+        """
+
+        def taken(message: M) -> None:
+            if self._alive:
+                try:
+                    take(message)
+                except Exception as error:
+                    self._failed(topic, error)
+                else:
+                    if self._failing:
+                        self._failing.pop(topic, None)
+
+        made = self._node.create_subscription(kind, topic, taken, profile, event_callbacks=events)
+        self._undo.append(lambda: self._node.destroy_subscription(made))
+
+    def service(
+        self, kind: type, name: str, serve: Callable[[Request, Response], Response]
+    ) -> None:
+        """
+        Make a service; where it fails, its answer is what an untouched response says: no success.
+
+        :param kind: its type.
+        :param name: its name.
+        :param serve: fills in and returns the response.
+        """
+
+        def served(request: Request, response: Response) -> Response:
+            try:
+                return serve(request, response) if self._alive else response
+            except Exception as error:
+                self._failed(name, error)
+                return response
+
+        made = self._node.create_service(kind, name, served, qos_profile=REQUESTS)
+        self._undo.append(lambda: self._node.destroy_service(made))
+
+    def timer(self, period: float, act: Callable[[], object]) -> Timer:
+        """
+        Make a timer of wall time, which works while simulated time stands still.
+
+        :param period: of its calls [s].
+        :param act: called without arguments.
+        :return: the timer.
+        """
+
+        def acted() -> None:
+            if self._alive:
+                try:
+                    act()
+                except Exception as error:
+                    self._failed(name, error)
+                else:
+                    self._failing.pop(name, None)
+
+        name = f'timer {act.__qualname__}'
+        made = self._node.create_timer(
+            period, acted, clock=Clock(clock_type=ClockType.STEADY_TIME)
+        )
+        self._undo.append(lambda: self._node.destroy_timer(made))
+        return made
+
+    def release(self) -> None:
+        """Destroy all that was made; what is still queued for it does nothing."""
+        self._alive = False
+        while self._undo:
+            self._undo.pop()()
+
+    def _failed(self, name: str, error: Exception) -> None:
+        place = error.__traceback__
+        while place and place.tb_next:
+            place = place.tb_next
+        where = f' ({place.tb_frame.f_code.co_name}, line {place.tb_lineno})' if place else ''
+        text = f'internal error in {name}: {type(error).__name__}: {error}{where}'
+        self._failing[name] = text
+        self._node.get_logger().error(text, throttle_duration_sec=TOLD_EVERY)

@@ -1,0 +1,43 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Keep what rclpy itself serves from ending the process."""
+
+from collections.abc import Callable
+from typing import TypeVar
+
+from lifecycle_msgs.srv import ChangeState
+from rclpy.node import Node
+from rclpy.service import Service
+
+Request = TypeVar('Request')
+Response = TypeVar('Response')
+
+
+def contain(node: Node) -> None:
+    """
+    Answer requests that rclpy's own services cannot fulfil, instead of raising.
+
+    rclpy 7.1 raises out of a lifecycle transition that does not fit the present state, and the
+    exception leaves the executor. The answer is then what an untouched response says: no success.
+
+    :param node: its services so far: parameters, type description, lifecycle.
+    """
+    for service in node.services:
+        service.callback = _contained(node, service)
+
+
+def _contained(node: Node, service: Service) -> Callable[[Request, Response], Response]:
+    serve = service.callback
+    name = service.srv_name
+
+    def served(request: Request, response: Response) -> Response:
+        try:
+            return serve(request, response)
+        except Exception as error:
+            wanted = ''
+            if isinstance(request, ChangeState.Request):
+                wanted = f' transition {request.transition.id} {request.transition.label}'
+            node.get_logger().warning(f'{name}: refused{wanted}: {error}'[:300])
+            return response
+
+    return served
