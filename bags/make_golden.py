@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 from damadics_fd.bag import BagWriter, read_columns
 from damadics_fd.bag.rosbag2 import qos
-from damadics_fd.core.pipeline import run
+from damadics_fd.core.monitor import run
 from damadics_fd.core.settings import Settings
 from damadics_plant.scenarios.library import load_scenario
 from damadics_plant.simulator import Simulator

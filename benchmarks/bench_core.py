@@ -20,7 +20,8 @@ from typing import Any
 import numpy as np
 from damadics_fd.core.approximator.estimator import Estimator
 from damadics_fd.core.decision.detector import Detector
-from damadics_fd.core.pipeline import run
+from damadics_fd.core.monitor import run
+from damadics_fd.core.quality import Refused
 from damadics_fd.core.sample import COLUMNS
 from damadics_fd.core.settings import Settings
 
@@ -110,7 +111,7 @@ def main() -> None:
             estimator, detector = Estimator(settings), Detector(settings)
             for row in rows:
                 estimate = estimator.update(*row)
-                if estimate is not None:
+                if not isinstance(estimate, Refused):
                     detector.update(estimate)
 
         head = {key: column[:few] for key, column in columns.items()}

@@ -14,7 +14,7 @@ from damadics_bringup.processes import (
     executable,
     parameters,
 )
-from damadics_fd.core.pipeline import run
+from damadics_fd.core.monitor import run
 from damadics_fd.core.settings import Settings
 from damadics_fd.ros import qos
 from damadics_msgs.msg import Estimate, FaultEvent, FaultFlag, Float64Stamped

@@ -13,7 +13,7 @@ from damadics_bringup.processes import Processes, free_domain, parameters, surro
 from damadics_fd.bag import read_columns, write_columns
 from damadics_fd.commands.replay.replay import main as replay
 from damadics_fd.core.decision.alarm import RAISED
-from damadics_fd.core.pipeline import run
+from damadics_fd.core.monitor import run
 from damadics_fd.core.sample import SIGNALS
 from damadics_fd.core.settings import Settings
 from damadics_plant import simulate

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from damadics_bringup.processes import parameters
 from damadics_fd.core.decision.alarm import NE107
-from damadics_fd.core.pipeline import run
+from damadics_fd.core.monitor import run
 from damadics_fd.core.sample import SIGNALS
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.signature.state import CAUSES, known

@@ -12,12 +12,11 @@ SAMPLE = {'cv': 0.5, 'x1': 0.5, 'p1': 3.5e6, 'p2': 2.6e6, 't1': 20.0, 'flow': 5.
 
 def detector() -> None:
     """Compile what judges an estimate; the longest of all."""
-    from damadics_fd.core.approximator.estimator import Estimate
+    from damadics_fd.core.approximator.state import Estimate
     from damadics_fd.core.decision.detector import Detector
     from damadics_fd.core.settings import Settings
 
-    fields = len(Estimate._fields)
-    Detector(Settings.for_mode('paper')).update(Estimate._make([1, *[0.0] * (fields - 2), 0]))
+    Detector(Settings.for_mode('paper')).update(Estimate(*Estimate.rows().item()))
 
 
 def the_others() -> None:
@@ -35,7 +34,7 @@ def the_others() -> None:
 
 def pipeline() -> None:
     """Compile the loop over columns, which is made of the steps above."""
-    from damadics_fd.core.pipeline import run
+    from damadics_fd.core.monitor import run
     from damadics_fd.core.settings import Settings
 
     columns = {name: np.array([value]) for name, value in SAMPLE.items()}

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from damadics_fd.bag.columns import read_columns
 from damadics_fd.core.decision.alarm import RAISED
-from damadics_fd.core.pipeline import Result, run
+from damadics_fd.core.monitor import run
+from damadics_fd.core.result import Result
 from damadics_fd.core.settings import Settings
 
 FAST = ('/measurement', '/fault_state', '/estimate', '/residual', '/threshold')

@@ -11,10 +11,8 @@ from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.recording import Recording, find_recordings
 from damadics_fd.causes import load_causes
 from damadics_fd.commands.replay.bags import joined
-from damadics_fd.core.decision.detector import Detector
 from damadics_fd.core.decision.events import Event
-from damadics_fd.core.pipeline import run
-from damadics_fd.core.scada.estimator import estimator_for
+from damadics_fd.core.monitor import monitor_for
 from damadics_fd.core.settings import Settings
 from damadics_fd.figures.decimation import Thinner
 from numpy.typing import NDArray
@@ -86,11 +84,10 @@ def _play(recording: Recording, mode: str) -> Playback:
     topic = recording.topic if recording.topic != '/measurement' else ''
     done = Playback(' '.join(filter(None, (recording.path.name, topic))))
     settings = Settings.for_mode(mode)
-    estimator, thinner = estimator_for(settings), Thinner()
-    detector = Detector(settings, load_causes().classes)
+    monitor, thinner = monitor_for(settings, load_causes().classes), Thinner()
     first = last = None
     for columns in joined(recording.chunks(done.problems.append)):
-        result = run(columns, settings, estimator, detector)
+        result = monitor.run(columns)
         done.events += result.events
         done.samples += len(columns['stamp'])
         first = int(columns['stamp'][0]) if first is None else first

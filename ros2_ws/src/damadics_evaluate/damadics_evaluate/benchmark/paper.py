@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from damadics_fd.core.pipeline import Result, run
+from damadics_fd.core.monitor import run
+from damadics_fd.core.result import Result
 from damadics_fd.core.scada.settings import ScadaSettings
 from damadics_fd.core.settings import Settings
 from numpy.typing import NDArray

@@ -5,7 +5,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from damadics_fd.core.pipeline import run
+from damadics_fd.core.monitor import run
 from damadics_fd.core.scada.estimator import ScadaEstimator
 from damadics_fd.core.settings import Settings
 

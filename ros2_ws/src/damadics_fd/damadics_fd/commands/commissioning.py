@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damadics_fd.core.modes import PHASE_MONITOR
-from damadics_fd.core.pipeline import Result, run
+from damadics_fd.core.monitor import run
+from damadics_fd.core.result import Result
 from damadics_fd.core.settings import Settings
 
 DAY = 86400.0
@@ -94,7 +95,7 @@ def propose(
     """
     Propose settings from a fault-free recording in which the valve moves both ways.
 
-    :param columns: as for `core.pipeline.run`.
+    :param columns: as for `core.monitor.run`.
     :param data_sheet: monitor settings with what the data sheet says: mass, stroke, area, plug.
     :param days: at most one false alarm in so many days.
     :return: the proposal.

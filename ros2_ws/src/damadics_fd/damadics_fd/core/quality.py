@@ -3,16 +3,28 @@
 """Check of one sample before it may touch any filter state."""
 
 import math
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
+from enum import IntEnum
+from typing import Annotated, NamedTuple
 
 from damadics_fd.core.jit import jit
 from damadics_fd.core.modes import MONITOR, PAPER
+from damadics_fd.core.record import Ints, Record
+from damadics_fd.core.settings import Settings
 
-REASONS = ('accepted', 'not_finite', 'out_of_range', 'zero_stamp', 'duplicate', 'out_of_order')
-ACCEPTED, NOT_FINITE, OUT_OF_RANGE, ZERO_STAMP, DUPLICATE, OUT_OF_ORDER = range(len(REASONS))
+
+class Reason(IntEnum):
+    """Say why a sample was refused."""
+
+    ACCEPTED = 0
+    NOT_FINITE = 1
+    OUT_OF_RANGE = 2
+    ZERO_STAMP = 3
+    DUPLICATE = 4
+    OUT_OF_ORDER = 5
+
+
+REASONS = tuple(reason.name.lower() for reason in Reason)
+ACCEPTED, NOT_FINITE, OUT_OF_RANGE, ZERO_STAMP, DUPLICATE, OUT_OF_ORDER = map(int, Reason)
 EXPLANATIONS = {
     'not_finite': 'a needed signal is missing, NaN or infinite',
     'out_of_range': 'a signal is outside its range: sensor failure or wrong unit',
@@ -28,26 +40,55 @@ REMEDIES = {
     'out_of_order': 'let one driver only send, in order of time',
 }
 
-DTYPE = np.dtype(
-    (
-        np.record,
-        np.dtype(
-            [
-                ('stamp', 'i8'),  # of the last accepted sample
-                ('started', '?'),
-                ('counts', 'i8', (len(REASONS),)),
-                ('gaps', 'i8'),
-                ('missed', 'i8'),  # gaps that were bridged, samples missing in them
-                ('restarts', 'i8'),
-                ('clock_jumps', 'i8'),
-                ('refused_in_a_row', 'i8'),
-                ('jump_stamp', 'i8'),
-                ('jump_count', 'i8'),  # samples in order after a clock set back
-            ],
-            align=True,
-        ),
-    )
-)
+
+class Refused(NamedTuple):
+    """Hold why one sample never reached the filters."""
+
+    reason: Reason
+    text: str  # the name of the reason, then signal and value, or both stamps
+    signal: str = ''  # out of SIGNALS, where one of them is the reason
+
+    @property
+    def name(self) -> str:
+        """
+        Return the name of the reason.
+
+        :return: a name out of REASONS.
+        """
+        return REASONS[self.reason]
+
+    @property
+    def explanation(self) -> str:
+        """
+        Say what the reason means.
+
+        :return: one clause.
+        """
+        return EXPLANATIONS[self.name]
+
+    @property
+    def remedy(self) -> str:
+        """
+        Say what to do.
+
+        :return: one clause.
+        """
+        return REMEDIES[self.name]
+
+
+class Quality(Record):
+    """Remember the last sample that was accepted, and count what was not."""
+
+    stamp: int  # of the last accepted sample
+    started: bool
+    counts: Annotated[Ints, len(REASONS)]
+    gaps: int
+    missed: int  # gaps that were bridged, samples missing in them
+    restarts: int
+    clock_jumps: int
+    refused_in_a_row: int
+    jump_stamp: int
+    jump_count: int  # samples in order after a clock set back
 
 
 @jit
@@ -69,7 +110,7 @@ def value_fault(value: float, low: float, high: float, needed: bool) -> int:
 
 
 @jit
-def signal_fault(c: Any, index: int, value: float) -> int:
+def signal_fault(c: Settings, index: int, value: float) -> int:
     """
     Judge one signal by its place in SIGNALS.
 
@@ -93,21 +134,8 @@ def signal_fault(c: Any, index: int, value: float) -> int:
 
 
 @jit
-def judge_signal(c: NDArray, index: int, value: float) -> int:
-    """
-    Judge one signal; `signal_fault` for an array of length 1, to be called from Python.
-
-    :param c: settings.
-    :param index: place in SIGNALS.
-    :param value: the signal.
-    :return: ACCEPTED, NOT_FINITE or OUT_OF_RANGE.
-    """
-    return signal_fault(c[0], index, value)
-
-
-@jit
 def check_values(
-    c: Any, cv: float, x1: float, p1: float, p2: float, t1: float, flow: float, ps: float
+    c: Settings, cv: float, x1: float, p1: float, p2: float, t1: float, flow: float, ps: float
 ) -> int:
     """
     Judge the signals of a sample.
@@ -139,7 +167,7 @@ def check_values(
 
 
 @jit
-def check_stamp(q: Any, c: Any, stamp: int) -> int:
+def check_stamp(q: Quality, c: Settings, stamp: int) -> int:
     """
     Judge the stamp of a sample with good values.
 
@@ -176,7 +204,7 @@ def check_stamp(q: Any, c: Any, stamp: int) -> int:
 
 
 @jit
-def admit(q: Any, c: Any, stamp: int, reason: int) -> float:
+def admit(q: Quality, c: Settings, stamp: int, reason: int) -> float:
     """
     Count a judged sample and return its time step.
 

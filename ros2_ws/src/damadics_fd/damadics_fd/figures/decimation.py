@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damadics_fd.bag.cdr.decoder import Columns
-from damadics_fd.core.pipeline import Result
+from damadics_fd.core.result import Result
 
 MOST_ROWS = 60_000  # kept, before they are thinned further
 KEPT = 11  # rows of a block at most: its first, and the extremes of five signals

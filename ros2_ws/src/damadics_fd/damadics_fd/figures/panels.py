@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damadics_fd.core.modes import PHASE_MONITOR, PHASE_PAPER
-from damadics_fd.core.pipeline import Result
+from damadics_fd.core.result import Result
 from damadics_fd.core.stamps import origin
 
 POINTS = 3000  # per curve: more than a page can show

@@ -11,10 +11,10 @@ from damadics_msgs.msg import FaultEvent, FaultFlag, Float64Stamped
 from std_msgs.msg import Header
 
 from damadics_fd.causes import explain
-from damadics_fd.core.approximator.step import Estimate
+from damadics_fd.core.approximator.state import Estimate
 from damadics_fd.core.decision.alarm import NE107
-from damadics_fd.core.decision.detector import Decision, Detector, Outcome
-from damadics_fd.core.decision.events import Event
+from damadics_fd.core.decision.detector import Detector, Outcome
+from damadics_fd.core.decision.events import Decision, Event
 from damadics_fd.core.modes import PHASE_INIT, PHASE_MONITOR
 from damadics_fd.core.text import SENTENCE, plain
 from damadics_fd.nodes.alarm_memory import AlarmMemory
@@ -36,7 +36,7 @@ EXAMPLES = """examples:
   ros2 run damadics_fd detector --ros-args -r __ns:=/lv101 --params-file valve.param.yaml"""
 HEARTBEAT = 1.0  # s of wall time
 START_ESTIMATOR = 'start the estimator: ros2 run damadics_fd estimator'
-READY = Estimate._make([1] + [0.0] * 14 + [0])  # an estimate that makes the core compile
+READY = Estimate(*Estimate.rows().item())  # an estimate that makes the core compile
 
 
 class DetectorNode(MonitoringNode):
@@ -151,7 +151,7 @@ class DetectorNode(MonitoringNode):
         self._number.data = decision.threshold
         self._threshold.publish(self._number)
         turned = self._was_silent and self._look()
-        if not turned and (before is None or shown(decision) != shown(before)):
+        if not turned and (before is None or decision.shown != before.shown):
             self._publish_flag()
             self.diagnostics.check()
 
@@ -246,16 +246,6 @@ class DetectorNode(MonitoringNode):
 
 
 LOST = 'the alarm of before is lost: look at the valve, then acknowledge'
-
-
-def shown(decision: Decision) -> tuple[bool, int, int]:
-    """
-    Return what of a decision is told at once when it changes.
-
-    :param decision: the decision.
-    :return: fault, state and level.
-    """
-    return decision.fault, decision.state, decision.level
 
 
 def main(args: list[str] | None = None) -> int:

@@ -13,9 +13,15 @@ from damadics_msgs.msg import Measurement, OperatorAction
 from damadics_msgs.srv import Reference as ReferenceService
 from damadics_msgs.srv import Relearn
 
-from damadics_fd.core.decision.alarm import NE107
-from damadics_fd.core.quality import EXPLANATIONS
-from damadics_fd.core.scada.estimator import estimator_for
+from damadics_fd.core.decision.alarm import (
+    FAILURE,
+    FUNCTION_CHECK,
+    NE107,
+    NORMAL,
+    OUT_OF_SPECIFICATION,
+)
+from damadics_fd.core.monitor import estimator_for
+from damadics_fd.core.quality import Reason, Refused
 from damadics_fd.core.text import plain
 from damadics_fd.nodes.frozen_position import FrozenPosition
 from damadics_fd.nodes.managed import MonitoringNode
@@ -40,7 +46,6 @@ EXAMPLES = """examples:
   ros2 run damadics_fd estimator --ros-args -r __ns:=/lv101 --params-file valve.param.yaml"""
 START_PLANT = 'start a driver of the valve, or the simulator: ros2 run damadics_plant plant'
 READY = (1, 0.5, 0.5, 0.0, 0.0, 20.0, 0.0, 0.0)  # a sample that makes the core compile
-MONITORING = ('monitor', 'paper')  # phases in which decisions count
 RETRY = 10.0  # s of wall time between two tries to keep what was learned
 RECENT = 1.5  # s of wall time for which a refused sample is told
 
@@ -94,7 +99,7 @@ class EstimatorNode(MonitoringNode):
             return
         self._frozen.note(measurement.header.stamp, measurement.cv, measurement.x1)
         estimate = self._core.update(*sample(measurement))
-        if estimate is None:
+        if isinstance(estimate, Refused):
             self._refused_at = time.monotonic()
             self.diagnostics.check()
             return
@@ -130,7 +135,7 @@ class EstimatorNode(MonitoringNode):
                 self._core.learned(),
                 self.settings.to_dict(),
                 source='live',
-                last_stamp=int(self._core.quality[0].stamp),
+                last_stamp=self._core.last_stamp,
             )
             return True, f'reference saved: {save_reference(path, reference)}'
         except (ValueError, OSError) as problem:
@@ -175,7 +180,7 @@ class EstimatorNode(MonitoringNode):
             action,
             response.success,
             response.message,
-            stamp=int(self._core.quality[0].stamp),
+            stamp=self._core.last_stamp,
         )
         return response
 
@@ -189,7 +194,7 @@ class EstimatorNode(MonitoringNode):
             OperatorAction.RELEARN,
             response.success,
             response.message,
-            stamp=int(self._core.quality[0].stamp),
+            stamp=self._core.last_stamp,
             user=request.user,
             comment=request.comment,
         )
@@ -199,10 +204,10 @@ class EstimatorNode(MonitoringNode):
     def report(self) -> Report:
         """Say what the estimator does, and what it refused."""
         counters = self._core.counters
-        good = self._core.phase in MONITORING
-        failed = self._core.failed_input
+        good = self._core.monitoring
+        failed, failing = self._core.failed_input, self._core.failing
         values = {
-            'NE 107': self._class_of(failed, good),
+            'NE 107': self._class_of(failing, good),
             'Phase': self._core.phase,
             'Learning progress (%)': 100.0 * self._message.progress,
             'Last refused': self._core.last_rejection or 'none',
@@ -213,18 +218,19 @@ class EstimatorNode(MonitoringNode):
         if failed:
             return Level.ERROR, f'not monitored, the input has failed: {failed}', values
         if time.monotonic() - self._refused_at < RECENT:
-            reason = self._core.last_rejection.split(':')[0]
-            return Level.WARN, f'samples refused: {EXPLANATIONS[reason]}', values
+            explanation = self._core.refused.explanation if self._core.refused else ''
+            return Level.WARN, f'samples refused: {explanation}', values
         if self._unsaved:
             return Level.WARN, self._unsaved, values
         if good and self._frozen.problem:
             return Level.WARN, self._frozen.problem, values
         return Level.OK if good else Level.WARN, self._core.status, values
 
-    def _class_of(self, failed: str, good: bool) -> str:
-        if failed:
-            return NE107[2 if failed.startswith('out_of_range') else 4]
-        return NE107[0 if good else 3]
+    def _class_of(self, failing: Refused | None, good: bool) -> str:
+        if failing:
+            outside = failing.reason == Reason.OUT_OF_RANGE
+            return NE107[OUT_OF_SPECIFICATION if outside else FAILURE]
+        return NE107[NORMAL if good else FUNCTION_CHECK]
 
 
 def main(args: list[str] | None = None) -> int:

@@ -6,13 +6,13 @@ from builtin_interfaces.msg import Time
 from damadics_msgs.msg import Estimate as EstimateMessage
 from damadics_msgs.msg import FaultEvent, FaultFlag, Measurement
 
-from damadics_fd.core.approximator.estimator import Estimate
-from damadics_fd.core.decision.detector import Decision
-from damadics_fd.core.decision.events import Event
+from damadics_fd.core.approximator.state import Estimate
+from damadics_fd.core.decision.events import Decision, Event
+from damadics_fd.core.sample import Sample
 from damadics_fd.core.stamps import SECOND
 
 SCALARS = tuple(
-    name for name in Estimate._fields if name not in ('stamp', 'alpha1', 'alpha4', 'alpha5')
+    name for name in Estimate.names() if name not in ('stamp', 'alpha1', 'alpha4', 'alpha5')
 )
 
 
@@ -36,15 +36,15 @@ def set_stamp(time: Time, stamp: int) -> None:
     time.sec, time.nanosec = divmod(stamp, SECOND)
 
 
-def sample(message: Measurement) -> tuple[int, float, float, float, float, float, float, float]:
+def sample(message: Measurement) -> Sample:
     """
-    Return a measurement as `Estimator.update` takes it.
+    Return a measurement as a monitor takes it.
 
     :param message: the measurement.
-    :return: stamp [ns], cv, x1, p1, p2, t1, flow, ps.
+    :return: the sample.
     """
     m = message
-    return nanoseconds(m.header.stamp), m.cv, m.x1, m.p1, m.p2, m.t1, m.flow, m.ps
+    return Sample(nanoseconds(m.header.stamp), m.cv, m.x1, m.p1, m.p2, m.t1, m.flow, m.ps)
 
 
 def write_estimate(estimate: Estimate, message: EstimateMessage) -> None:

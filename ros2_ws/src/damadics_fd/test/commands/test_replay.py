@@ -13,7 +13,7 @@ from damadics_fd.bag.recording import Recording, find_recordings
 from damadics_fd.bag.tables import LUBLIN
 from damadics_fd.commands.replay import output
 from damadics_fd.commands.replay.replay import main, unique_stems
-from damadics_fd.core.pipeline import run
+from damadics_fd.core.monitor import run
 from damadics_fd.core.settings import Settings
 
 from ..bag.bag_support import as_csv, needs_messages, replayed, stroke

@@ -7,7 +7,7 @@ import math
 
 import hypothesis.strategies as st
 import pytest
-from damadics_fd.core.approximator.estimator import Estimate
+from damadics_fd.core.approximator.state import Estimate
 from damadics_fd.core.decision import alarm
 from damadics_fd.core.decision.alarm import (
     ACKNOWLEDGED,

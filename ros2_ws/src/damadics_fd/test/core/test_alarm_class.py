@@ -17,7 +17,8 @@ from damadics_fd.core.decision.alarm import (
     SHELVED,
 )
 from damadics_fd.core.decision.detector import Detector
-from damadics_fd.core.pipeline import Result, run
+from damadics_fd.core.monitor import run
+from damadics_fd.core.result import Result
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.signature.state import CAUSES, SignatureSettings
 

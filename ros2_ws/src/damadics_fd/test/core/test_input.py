@@ -10,7 +10,8 @@ import pytest
 from damadics_fd.core.approximator.estimator import Estimator
 from damadics_fd.core.decision.detector import Detector
 from damadics_fd.core.modes import PHASE_HOLD, PHASE_MONITOR
-from damadics_fd.core.pipeline import run
+from damadics_fd.core.monitor import run
+from damadics_fd.core.quality import Reason, Refused
 from damadics_fd.core.settings import Settings, SettingsError
 from hypothesis import given
 from hypothesis import settings as profile
@@ -71,17 +72,21 @@ def test_refused_sample_leaves_no_trace(armed, signal):  # IN-1, IN-2
 
 def test_reason_names_the_signal():
     estimator = Estimator(SETTINGS)
-    assert estimator.update(1, 0.5, 0.5, 3.5e6, 2.6e6, 20.0, 5.0, math.nan) is None
+    assert (
+        estimator.update(1, 0.5, 0.5, 3.5e6, 2.6e6, 20.0, 5.0, math.nan).reason
+        == Reason.NOT_FINITE
+    )
     assert estimator.last_rejection == 'not_finite: ps = nan'
-    assert estimator.update(1, 0.5, 55.0, 3.5e6, 2.6e6, 20.0, 5.0, 1e5) is None
+    assert estimator.update(1, 0.5, 55.0, 3.5e6, 2.6e6, 20.0, 5.0, 1e5).signal == 'x1'
     assert estimator.last_rejection == 'out_of_range: x1 = 55'
     assert estimator.status == 'waiting for the first good sample'
 
 
 def test_unmeasured_signals_are_no_fault_in_paper_mode():
     estimator = Estimator(Settings.for_mode('paper'))
-    assert estimator.update(0, 0.5, 0.5, *[math.nan] * 5) is not None
-    assert estimator.update(2_500_000, 0.5, 0.5, math.inf, *[math.nan] * 4) is None
+    assert estimator.update(0, 0.5, 0.5, *[math.nan] * 5).stamp == 0
+    refused = estimator.update(2_500_000, 0.5, 0.5, math.inf, *[math.nan] * 4)
+    assert refused == (Reason.NOT_FINITE, 'not_finite: p1 = inf', 'p1')
 
 
 def stamps(*values):
@@ -210,7 +215,7 @@ def test_any_input_keeps_states_finite_and_weights_bounded(velocity, samples):  
         before = estimator.state.tobytes()
         estimate = estimator.update(stamp, *sample)
         s = estimator.state[0]
-        if estimate is None:
+        if isinstance(estimate, Refused):
             assert estimator.state.tobytes() == before
             assert estimator.last_rejection
             continue

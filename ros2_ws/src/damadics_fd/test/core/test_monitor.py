@@ -7,10 +7,11 @@ import pytest
 from damadics_fd.core.approximator import observer, velocity
 from damadics_fd.core.approximator.estimator import Estimator
 from damadics_fd.core.approximator.network import sigmoids
-from damadics_fd.core.approximator.step import STATE, start
+from damadics_fd.core.approximator.state import State
+from damadics_fd.core.approximator.step import start
 from damadics_fd.core.jit import jit
 from damadics_fd.core.modes import PHASE_LEARN_PHI, PHASE_MONITOR
-from damadics_fd.core.pipeline import run
+from damadics_fd.core.monitor import run
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.valve.force import force_input
 from damadics_plant import simulate
@@ -39,7 +40,7 @@ def unit_steps(state, settings, y, u, learning, xi2):
 def unit_vector(learning, n=3):
     t = 0.005 * np.arange(n)
     y = 0.6 + 0.2 * np.sin(0.5 * t)
-    xi2, state, settings = np.zeros(n), np.zeros(1, STATE), SETTINGS.record()
+    xi2, state, settings = np.zeros(n), State.rows(), SETTINGS.record()
     start(state, settings)
     unit_steps(state, settings, y, y + 0.02 * np.sign(np.cos(0.5 * t)), learning, xi2)
     return xi2

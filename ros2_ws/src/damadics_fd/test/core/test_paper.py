@@ -8,10 +8,13 @@ import sys
 
 import numpy as np
 import pytest
-from damadics_fd.core import pipeline
+from damadics_fd.core import monitor
 from damadics_fd.core.approximator.estimator import Estimator
+from damadics_fd.core.approximator.state import Estimate
 from damadics_fd.core.decision.detector import Detector
-from damadics_fd.core.pipeline import run, watch
+from damadics_fd.core.decision.events import Decision
+from damadics_fd.core.monitor import Chain, run
+from damadics_fd.core.quality import Refused
 from damadics_fd.core.settings import Settings
 
 
@@ -51,10 +54,10 @@ def test_single_samples_and_columns_agree_bit_for_bit(mode):
     names = ('stamp', 'cv', 'x1', 'p1', 'p2', 't1', 'flow', 'ps')
     for row in range(len(columns['stamp'])):
         estimate = estimator.update(*(columns[name][row].item() for name in names))
-        assert (estimate is not None) == result.accepted[row]
-        if estimate is not None:
-            assert tuple(result.estimates[row]) == estimate
-            assert tuple(result.decisions[row]) == detector.update(estimate)[:-1]
+        assert isinstance(estimate, Refused) != result.accepted[row]
+        if result.accepted[row]:
+            assert Estimate(*result.estimates[row].item()) == estimate
+            assert Decision(*result.decisions[row].item()) == detector.update(estimate)
     assert estimator.counters == result.counters
     assert estimator.state.tobytes() == result.estimator.state.tobytes()
     assert result.counters['not_finite'] == 4
@@ -82,9 +85,11 @@ def test_watching_gives_the_events_and_the_states_of_a_run(mode, monkeypatch):
     columns['x1'][1500:] += np.where(np.arange(2500) % 40 < 20, 0.2, 0.0)
     result = run(columns, settings)
     assert len(result.events) > 5 or mode == 'monitor'
-    monkeypatch.setattr(pipeline, 'ROOM', 3)  # several turns
+    monkeypatch.setattr(monitor, 'ROOM', 3)  # several turns
     estimator, detector = Estimator(settings), Detector(settings)
-    assert watch(columns, settings, estimator, detector) == result.events
+    chain = Chain(settings, estimator=estimator, detector=detector)
+    assert chain.events(columns) == result.events
+    assert detector.decision == result.detector.decision
     assert estimator.counters == result.counters
     for mine, other in (
         (estimator, result.estimator),
@@ -118,7 +123,7 @@ def test_plain_python_gives_the_same_numbers():
         'import sys; sys.path[:0] = [sys.argv[1]]\n'
         'import numpy as np\n'
         'from test_paper import recording\n'
-        'from damadics_fd.core.pipeline import run\n'
+        'from damadics_fd.core.monitor import run\n'
         'from damadics_fd.core.settings import Settings\n'
         'r = run(recording(700), Settings.for_mode("paper"))\n'
         'total = float(np.nansum(np.abs(r.estimates["xi2"])))\n'

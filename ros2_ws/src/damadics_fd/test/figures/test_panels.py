@@ -5,10 +5,11 @@
 import numpy as np
 import pytest
 from damadics_fd.core.approximator.estimator import Estimator
-from damadics_fd.core.approximator.step import ESTIMATE
+from damadics_fd.core.approximator.state import Estimate
 from damadics_fd.core.decision.detector import Detector
-from damadics_fd.core.decision.judge import DECISION
-from damadics_fd.core.pipeline import Result, run
+from damadics_fd.core.decision.events import Decision
+from damadics_fd.core.monitor import run
+from damadics_fd.core.result import Result
 from damadics_fd.core.settings import Settings
 from damadics_fd.figures import decimation
 from damadics_fd.figures.panels import envelope, six_panels
@@ -52,8 +53,8 @@ def test_rows_kept_for_a_picture_stay_few_and_hold_every_spike(monkeypatch):
         columns = {'stamp': stamp, 'cv': np.zeros(rows), 'x1': rng.random(rows)}
         result = Result(
             np.zeros(rows, np.uint8),
-            np.zeros(rows, ESTIMATE),
-            np.zeros(rows, DECISION),
+            Estimate.rows(rows),
+            Decision.rows(rows),
             Estimator(settings),
             Detector(settings),
         )

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from damadics_fd.core.approximator.estimator import Estimator
 from damadics_fd.core.modes import PHASE_LEARN_PHI, PHASE_MONITOR
-from damadics_fd.core.pipeline import run
-from damadics_fd.core.scada.estimator import ScadaEstimator, estimator_for
+from damadics_fd.core.monitor import estimator_for, run
+from damadics_fd.core.quality import Refused
+from damadics_fd.core.scada.estimator import ScadaEstimator
 from damadics_fd.core.settings import Settings
 
 plant = pytest.importorskip('damadics_plant')
@@ -51,7 +52,7 @@ def test_sample_by_sample_gives_the_same(columns, result):
 def test_bad_samples_are_refused_with_a_reason(columns):
     estimator = estimator_for(SETTINGS)
     row = [columns[name][5].item() for name in NAMES]
-    assert estimator.update(*row) is not None
+    assert not isinstance(estimator.update(*row), Refused)
     before = estimator.monitor._state.tobytes()
     for index, value, reason in (
         (0, row[0], 'duplicate'),
@@ -62,11 +63,10 @@ def test_bad_samples_are_refused_with_a_reason(columns):
         bad = list(row)
         bad[0] = row[0] + (index != 0)
         bad[index] = value
-        assert estimator.update(*bad) is None
-        assert reason in estimator.last_rejection
+        assert estimator.update(*bad).name == reason
         assert estimator.monitor._state.tobytes() == before
     bare = [row[0] + 10**9, *row[1:5], math.nan, math.nan, math.nan]
-    assert estimator.update(*bare) is not None  # flow, temperature, chamber pressure may lack
+    assert estimator.update(*bare).stamp == bare[0]  # flow, temperature, chamber pressure may lack
 
 
 class Held:

@@ -14,7 +14,7 @@ import pytest
 import yaml
 from damadics_fd.bag import write_columns
 from damadics_fd.commands.commission import main as commission
-from damadics_fd.core.pipeline import run
+from damadics_fd.core.monitor import run
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.signature.signature import SignatureView
 

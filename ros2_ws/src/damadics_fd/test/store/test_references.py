@@ -10,7 +10,7 @@ import damadics_fd
 import numpy as np
 import pytest
 from damadics_fd.core.approximator.estimator import Estimator
-from damadics_fd.core.pipeline import run
+from damadics_fd.core.monitor import run
 from damadics_fd.core.settings import Settings
 from damadics_fd.store.references import (
     NoReferenceError,

@@ -7,7 +7,7 @@ from concurrent.futures import ProcessPoolExecutor
 from typing import Any
 
 import numpy as np
-from damadics_fd.core.pipeline import run
+from damadics_fd.core.monitor import run
 from damadics_fd.core.settings import Settings
 from damadics_plant import Fault, LuGreActuator, Scenario, simulate
 from damadics_plant.scenarios.sources import RandomSteps, Sine

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from damadics_fd.core.modes import PHASE_MONITOR
-from damadics_fd.core.pipeline import run
+from damadics_fd.core.monitor import run
 from damadics_fd.core.settings import Settings
 from damadics_plant import Fault, Scenario, Simulator, simulate
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 from damadics_fd.core.modes import PHASE_MONITOR
-from damadics_fd.core.pipeline import Result
+from damadics_fd.core.result import Result
 
 
 def seconds(result: Result) -> list[float]:

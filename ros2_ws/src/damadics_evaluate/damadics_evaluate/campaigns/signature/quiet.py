@@ -5,7 +5,7 @@
 from typing import Any
 
 import numpy as np
-from damadics_fd.core.pipeline import run
+from damadics_fd.core.monitor import run
 from damadics_plant import LuGreActuator, Scenario
 from damadics_plant.scenarios.sources import RandomSteps, Sine, Steps
 from tqdm import tqdm

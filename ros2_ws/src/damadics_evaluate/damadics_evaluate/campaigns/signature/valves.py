@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 from damadics_fd.core.decision.alarm import RAISED
-from damadics_fd.core.pipeline import Result
+from damadics_fd.core.result import Result
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.signature.state import CAUSES
 from damadics_plant import Actuator, Fault, LuGreActuator, Scenario, simulate

@@ -17,14 +17,11 @@ from damadics_fd.bag.recording import Recording
 from damadics_fd.causes import load_causes
 from damadics_fd.commands.replay.flags import FlagWriter
 from damadics_fd.core.decision.alarm import RAISED
-from damadics_fd.core.decision.detector import Detector
 from damadics_fd.core.decision.events import Event
-from damadics_fd.core.pipeline import Result, run, watch
-from damadics_fd.core.quality import EXPLANATIONS, REASONS, REMEDIES
+from damadics_fd.core.monitor import Chain, monitor_for
+from damadics_fd.core.quality import EXPLANATIONS, REMEDIES
 from damadics_fd.core.sample import SIGNALS
-from damadics_fd.core.scada.estimator import estimator_for
 from damadics_fd.core.settings import Settings
-from damadics_fd.core.signature.signature import Signature
 from damadics_fd.core.signature.state import STATE_VERIFY
 from damadics_fd.core.stamps import SECOND, origin
 from damadics_fd.figures.decimation import Thinner
@@ -67,46 +64,6 @@ class Outcome:
     status: str = ''
     problems: list[str] = field(default_factory=list)
     error: str = ''
-
-
-class Chain:
-    """
-    Estimator and detector of a mode, as the nodes run them.
-
-    :param settings: all settings.
-    :param learned: what the estimator begins with, as a reference keeps it; None: nothing.
-    """
-
-    def __init__(self, settings: Settings, learned: dict[str, Any] | None = None):
-        self._settings = settings
-        self._estimator = estimator_for(settings)
-        if learned is not None:
-            self._estimator.restore(learned)
-        self._detector = Detector(settings, load_causes().classes)
-
-    def take(self, columns: Columns) -> Result:
-        """Judge the next columns and keep everything."""
-        return run(columns, self._settings, self._estimator, self._detector)
-
-    def watch(self, columns: Columns) -> list[Event]:
-        """Judge the next columns and keep the events only."""
-        return watch(columns, self._settings, self._estimator, self._detector)
-
-    @property
-    def signature(self) -> Signature:
-        """The valve signature."""
-        return self._detector.signature
-
-    @property
-    def status(self) -> str:
-        """What the estimator does, in a few words."""
-        return self._estimator.status
-
-    @property
-    def refused(self) -> dict[str, int]:
-        """Samples that the estimator refused, by reason."""
-        counters = self._estimator.counters
-        return {name: counters[name] for name in REASONS[1:] if counters[name]}
 
 
 def evidence(event: Event, zero: int) -> dict[str, Any]:
@@ -160,9 +117,10 @@ class Plan:
     bags: Path | None = None
     learned: dict[str, Any] | None = None
 
-    def chain(self) -> Chain:
-        """Return estimator and detector in their first state."""
-        return Chain(Settings.for_mode(self.mode, **self.settings), self.learned)
+    def monitor(self) -> Chain:
+        """Return the monitor in its first state."""
+        settings = Settings.for_mode(self.mode, **self.settings)
+        return monitor_for(settings, load_causes().classes).starting_from(self.learned)
 
 
 def replay(
@@ -191,11 +149,11 @@ def replay(
 def _replay(
     recording: Recording, plan: Plan, outcome: Outcome, progress: Callable[[int], None], stem: str
 ) -> None:
-    chain = plan.chain()
+    monitor = plan.monitor()
     zero = first = last = None
     flags = FlagWriter(plan.bags / f'{stem}_flags.mcap', recording) if plan.bags else None
     thinner = Thinner() if plan.figures else None
-    forces = ForceMap(chain.signature) if plan.figures and plan.mode == 'monitor' else None
+    forces = ForceMap(monitor.signature) if plan.figures and plan.mode == 'monitor' else None
     lacking = set(NEEDED[plan.mode])
     spent = 0.0
     pieces = joined(recording.chunks(outcome.problems.append))
@@ -212,8 +170,8 @@ def _replay(
             if zero is None or first is None:
                 zero, first = origin(int(stamp[0])), int(stamp[0])
             last = int(stamp[-1])
-            result = chain.take(columns) if flags or thinner else None
-            events = result.events if result else chain.watch(columns)
+            result = monitor.run(columns) if flags or thinner else None
+            events = result.events if result else monitor.events(columns)
             spent += time.perf_counter() - began
             collect(outcome.detections, events, zero)
             outcome.samples += len(stamp)
@@ -231,14 +189,14 @@ def _replay(
         raise BagError('has no measurement: the topic is empty', recording.name)
     outcome.duration_s = (last - first) / SECOND
     outcome.samples_per_s = outcome.samples / spent
-    outcome.refused, outcome.status = chain.refused, chain.status
+    outcome.refused, outcome.status = monitor.refused, monitor.status
     _judge_refused(outcome, lacking)
     if thinner and plan.figures:
         _draw(thinner, recording, outcome, plan.figures / f'{stem}.png')
-    if forces and plan.figures and chain.signature.view().state >= STATE_VERIFY:
+    if forces and plan.figures and monitor.signature.view().state >= STATE_VERIFY:
         force_over_position(
             forces,
-            chain.signature,
+            monitor.signature,
             plan.figures / f'{stem}_signature.png',
             Path(recording.name).name.removesuffix('.mcap'),
         )
@@ -300,4 +258,4 @@ def warm_up(plans: Sequence[Plan]) -> None:
     """Load or compile the loops, so that the first recording is not slower than the next."""
     columns: Columns = {name: np.array([0.5]) for name in SIGNALS}
     for plan in plans:
-        plan.chain().watch({'stamp': np.array([1]), **columns})
+        plan.monitor().events({'stamp': np.array([1]), **columns})

@@ -12,7 +12,7 @@ from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.recording import Recording
 from damadics_fd.bag.rosbag2 import qos
 from damadics_fd.bag.writer import NANO, BagWriter
-from damadics_fd.core.pipeline import Result
+from damadics_fd.core.result import Result
 
 NUMBER = 'damadics_msgs/msg/Float64Stamped'
 ESTIMATE = 'damadics_msgs/msg/Estimate'
@@ -46,7 +46,7 @@ class FlagWriter:
         self._names = {
             name: prefix + name for name in ('estimate', 'residual', 'threshold', 'fault_flag')
         }
-        self._frame_id = _frame_id(recording)
+        self._frame_id = frame_id(recording)
         path.unlink(missing_ok=True)  # what an earlier replay wrote is no recording
         self._bag = BagWriter(path)
         kinds = {'estimate': ESTIMATE, 'residual': NUMBER, 'threshold': NUMBER, 'fault_flag': FLAG}
@@ -107,8 +107,13 @@ class FlagWriter:
         self._bag.close()
 
 
-def _frame_id(recording: Recording) -> str:
-    """Return the tag of the actuator, as its first message has it."""
+def frame_id(recording: Recording) -> str:
+    """
+    Return the tag of the actuator, as its first message has it.
+
+    :param recording: the recording.
+    :return: `frame_id`, or the name in a table; '' where there is none.
+    """
     if recording.table or recording.maps:
         return recording.table.name if recording.table else ''
     try:

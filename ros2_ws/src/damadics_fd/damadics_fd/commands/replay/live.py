@@ -5,7 +5,6 @@
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from typing import Any
 
 import numpy as np
 import rclpy
@@ -16,16 +15,18 @@ from rclpy.duration import Duration
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
+from std_msgs.msg import Header
 from tqdm import tqdm
 
 from damadics_fd.bag.cdr.decoder import Columns
 from damadics_fd.bag.recording import Recording
-from damadics_fd.causes import load_causes
+from damadics_fd.causes import explain, load_causes
 from damadics_fd.commands.replay.bags import Plan, joined
-from damadics_fd.core.decision.detector import Detector
-from damadics_fd.core.sample import SIGNALS
-from damadics_fd.core.scada.estimator import estimator_for
-from damadics_fd.core.settings import Settings
+from damadics_fd.commands.replay.flags import frame_id
+from damadics_fd.core.monitor import Chain
+from damadics_fd.core.quality import Refused
+from damadics_fd.core.sample import SIGNALS, Sample
+from damadics_fd.nodes.signature_publisher import SignaturePublisher
 from damadics_fd.ros import qos
 from damadics_fd.ros.conversions import event_message, set_stamp, write_estimate, write_flag
 
@@ -34,37 +35,77 @@ HEARTBEAT = 10**9  # [ns] of scenario time between two flags without change
 DISCOVERY = 3.5  # [s] without a new subscriber before the first sample; DDS announces every 3 s
 
 
+class Judgements:
+    """
+    Publish what estimator and detector say of a recording, as their nodes do.
+
+    :param node: publishes.
+    :param monitor: of the mode.
+    :param tag: of the actuator.
+    """
+
+    def __init__(self, node: Node, monitor: Chain, tag: str) -> None:
+        self._monitor = monitor
+        self._causes = load_causes()
+        self._header = Header(frame_id=tag)
+        self._estimate = node.create_publisher(EstimateMessage, 'estimate', qos.SAMPLES)
+        self._residual = node.create_publisher(Float64Stamped, 'residual', qos.SAMPLES)
+        self._threshold = node.create_publisher(Float64Stamped, 'threshold', qos.SAMPLES)
+        self._flag = node.create_publisher(FaultFlag, 'fault_flag', qos.FLAG)
+        self._event = node.create_publisher(FaultEvent, 'fault_event', qos.EVENTS)
+        self._signature = SignaturePublisher(
+            node, monitor.signature, tag, monitor.settings, None, self._causes.limits
+        )
+        self._shown: tuple[tuple[bool, int, int], int] | None = None
+
+    def take(self, sample: Sample) -> None:
+        """
+        Judge a sample.
+
+        :param sample: of the recording.
+        """
+        estimate = self._monitor.estimator.update(*sample)
+        if isinstance(estimate, Refused):
+            return
+        header = self._header
+        set_stamp(header.stamp, sample.stamp)
+        message = EstimateMessage(header=header)
+        write_estimate(estimate, message)
+        self._estimate.publish(message)
+        decision = self._monitor.detector.update(estimate)
+        self._residual.publish(Float64Stamped(header=header, data=decision.residual))
+        self._threshold.publish(Float64Stamped(header=header, data=decision.threshold))
+        shown = decision.shown, sample.stamp // HEARTBEAT
+        if shown != self._shown:
+            self._shown = shown
+            flag = FaultFlag(header=header)
+            write_flag(decision, flag)
+            self._flag.publish(flag)
+        for event in decision.events:
+            explained = explain(event, self._causes, header.frame_id)
+            self._event.publish(event_message(explained, header.frame_id))
+        self._signature.update(header, sample.stamp)
+
+
 class Player(Node):
     """
-    Publish the samples of a recording and what estimator and detector make of them.
+    Publish the samples of a recording at the pace of their stamps.
 
-    :param settings: of estimator and detector; None publishes the samples alone.
     :param rate: speed in multiples of real time.
-    :param learned: what the estimator begins with, as a reference keeps it; None: nothing.
+    :param monitor: what judges the samples; None publishes the samples alone.
+    :param tag: of the actuator.
     """
 
-    def __init__(
-        self, settings: Settings | None, rate: float, learned: dict[str, Any] | None = None
-    ):
+    def __init__(self, rate: float, monitor: Chain | None, tag: str) -> None:
         super().__init__('replay')
         self._rate = rate
-        self._clock = self.create_publisher(Clock, '/clock', 10)
+        self._time = self.create_publisher(Clock, '/clock', 10)
         self._measurement = self.create_publisher(Measurement, 'measurement', qos.SAMPLES)
         self._state = self.create_publisher(FaultState, 'fault_state', qos.SAMPLES)
-        self._judges = None
-        if settings:
-            estimator = estimator_for(settings)
-            if learned is not None:
-                estimator.restore(learned)
-            self._judges = estimator, Detector(settings, load_causes().classes)
-            self._estimate = self.create_publisher(EstimateMessage, 'estimate', qos.SAMPLES)
-            self._residual = self.create_publisher(Float64Stamped, 'residual', qos.SAMPLES)
-            self._threshold = self.create_publisher(Float64Stamped, 'threshold', qos.SAMPLES)
-            self._flag = self.create_publisher(FaultFlag, 'fault_flag', qos.FLAG)
-            self._event = self.create_publisher(FaultEvent, 'fault_event', qos.EVENTS)
+        self._judgements = Judgements(self, monitor, tag) if monitor else None
+        self._tag = tag
         self._begin: tuple[int, float] | None = None  # stamp [ns] and wall time [s] of the start
         self._last_clock = 0.0
-        self._shown: tuple[Any, ...] = ()
 
     def wait_for_subscribers(self, needed: bool) -> None:
         """Wait until all subscribers are matched; where they are needed, until there is one."""
@@ -107,14 +148,16 @@ class Player(Node):
             self._wait_for(stamp)
             message = Measurement(**dict(zip(SIGNALS, signals, strict=True)))
             set_stamp(message.header.stamp, stamp)
+            message.header.frame_id = self._tag
             self._measurement.publish(message)
             if 'fault' in columns:
                 state = FaultState(
                     fault=int(columns['fault'][row]), strength=float(columns['strength'][row])
                 )
-                state.header.stamp = message.header.stamp
+                state.header = message.header
                 self._state.publish(state)
-            self._judge(stamp, signals)
+            if self._judgements:
+                self._judgements.take(Sample(stamp, *signals))
             yield row
 
     def finish(self) -> None:
@@ -139,31 +182,8 @@ class Player(Node):
     def _tell(self, stamp: int, now: float) -> None:
         clock = Clock(clock=Time())
         set_stamp(clock.clock, stamp)
-        self._clock.publish(clock)
+        self._time.publish(clock)
         self._last_clock = now
-
-    def _judge(self, stamp: int, signals: Sequence[float]) -> None:
-        if not self._judges:
-            return
-        estimator, detector = self._judges
-        estimate = estimator.update(stamp, *signals)
-        if estimate is None:
-            return
-        decision = detector.update(estimate)
-        message = EstimateMessage()
-        write_estimate(estimate, message)
-        self._estimate.publish(message)
-        values = decision.residual, decision.threshold
-        for publisher, value in zip((self._residual, self._threshold), values, strict=True):
-            publisher.publish(Float64Stamped(header=message.header, data=value))
-        shown = decision.fault, decision.state, decision.level, stamp // HEARTBEAT
-        if shown != self._shown:
-            self._shown = shown
-            flag = FaultFlag()
-            write_flag(decision, flag)
-            self._flag.publish(flag)
-        for event in decision.events:
-            self._event.publish(event_message(event, ''))
 
 
 def publish(
@@ -187,8 +207,7 @@ def publish(
     rclpy.init(args=list(ros_args))
     try:
         for recording in recordings:
-            settings = Settings.for_mode(plan.mode, **plan.settings)
-            player = Player(None if inputs_only else settings, rate, plan.learned)
+            player = Player(rate, None if inputs_only else plan.monitor(), frame_id(recording))
             player.wait_for_subscribers(inputs_only)
             with tqdm(unit=' samples', unit_scale=True, desc=recording.name, disable=None) as bar:
                 truth = recording.truth(lambda text: None)

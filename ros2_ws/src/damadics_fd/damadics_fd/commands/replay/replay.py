@@ -28,7 +28,7 @@ from damadics_fd.commands.replay.output import (
     write_outcomes,
 )
 from damadics_fd.core.modes import MODES
-from damadics_fd.core.scada.estimator import estimator_for
+from damadics_fd.core.monitor import estimator_for
 from damadics_fd.core.settings import Settings, SettingsError
 from damadics_fd.ros.arguments import split_ros_args
 from damadics_fd.store.references import ReferenceFileError, load_reference

@@ -1,33 +1,30 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The estimator: one measurement in, one estimate out."""
+"""The estimator of the modes paper and monitor: one measurement in, one estimate out."""
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from damadics_fd.core import quality
+from damadics_fd.core.approximator.state import LEARNED, Estimate, State
 from damadics_fd.core.approximator.step import (
-    ESTIMATE,
-    LEARNED,
-    STATE,
-    Estimate,
+    estimate_column,
     progress,
     start,
     take_up,
     update,
 )
+from damadics_fd.core.intake import Intake
 from damadics_fd.core.modes import PHASE_HOLD, PHASE_MONITOR, PHASE_PAPER, PHASES
-from damadics_fd.core.sample import SIGNALS
+from damadics_fd.core.quality import Refused
+from damadics_fd.core.record import Array, Floats, Ints, Plain, Saved
 from damadics_fd.core.settings import Settings
 
 STILL = 600.0  # s without motion after which the status says so
-FAILED = 4.0  # s of refused samples after which the input counts as failed
 
 
-class Estimator:
+class Estimator(Intake):
     """
     Estimate velocity, residual and learned bound from one measurement after the other.
 
@@ -37,25 +34,20 @@ class Estimator:
     >>> estimator = Estimator(Settings.for_mode('paper'))
     >>> estimator.update(0, 1.0, 0.0, 3.5e6, 2.6e6, 20.0, 12.0, math.nan).phase
     4
-    >>> estimator.update(2_500_000, 1.0, math.nan, 3.5e6, 2.6e6, 20.0, 12.0, math.nan)
-    >>> estimator.last_rejection
+    >>> estimator.update(2_500_000, 1.0, math.nan, 3.5e6, 2.6e6, 20.0, 12.0, math.nan).text
     'not_finite: x1 = nan'
     """
 
     def __init__(self, settings: Settings) -> None:
-        self.settings = settings
-        self.quality = np.zeros(1, quality.DTYPE)
-        self.state = np.zeros(1, STATE)
-        self.last_rejection = ''
-        self._settings = settings.record()
-        self._estimate = np.zeros(1, ESTIMATE)
+        super().__init__(settings)
+        self.state = State.rows()
+        self._estimate = Estimate.rows()
         self.reset()
 
     def reset(self) -> None:
         """Forget everything: what was learned, the filters and the counters."""
-        self.quality[:] = np.zeros(1, quality.DTYPE)
-        self.state[:] = np.zeros(1, STATE)
-        self.last_rejection = ''
+        self.forget()
+        self.state[:] = State.rows()
         start(self.state, self._settings)
 
     def update(
@@ -68,7 +60,7 @@ class Estimator:
         t1: float,
         flow: float,
         ps: float,
-    ) -> Estimate | None:
+    ) -> Estimate | Refused:
         """
         Take one measurement, with the fields of damadics_msgs/Measurement.
 
@@ -80,7 +72,7 @@ class Estimator:
         :param t1: temperature of the medium [degC].
         :param flow: flow [kg/s].
         :param ps: chamber pressure, gauge [Pa]; NaN where not measured.
-        :return: the estimate; None where the sample was refused, see `last_rejection`.
+        :return: the estimate, or why the sample was refused.
         """
         reason = update(
             self.quality,
@@ -97,35 +89,29 @@ class Estimator:
             ps,
         )
         if reason:
-            self.last_rejection = self._explain(reason, stamp, (cv, x1, p1, p2, t1, flow, ps))
-            return None
-        return Estimate._make(self._estimate.item())
+            return self.note(reason, stamp, (cv, x1, p1, p2, t1, flow, ps), self.last_stamp)
+        return Estimate(*self._estimate.item())
 
-    @property
-    def counters(self) -> dict[str, int]:
+    def run(
+        self,
+        stamp: Ints,
+        signals: Sequence[Floats],
+        reason: NDArray[np.uint8],
+        estimates: Array,
+    ) -> None:
         """
-        Return how many samples were accepted and refused for which reason, and interruptions.
+        Take a column of measurements.
 
-        :return: counts by name.
+        :param stamp: sampling instants [ns].
+        :param signals: contiguous columns in the order of SIGNALS.
+        :param reason: written: 0 or the reason of refusal.
+        :param estimates: rows of `Estimate`, written; those of refused samples stay as they are.
         """
-        q = self.quality[0]
-        counts = {name: int(n) for name, n in zip(quality.REASONS, q.counts, strict=True)}
-        for name in ('gaps', 'missed', 'restarts', 'clock_jumps', 'refused_in_a_row'):
-            counts[name] = int(q[name])
-        return counts
-
-    @property
-    def failed_input(self) -> str:
-        """
-        Say what is wrong with the input where nothing else has come for `FAILED` seconds.
-
-        :return: signal, value, how long in nominal sample periods, remedy; '' where all is well.
-        """
-        lasting = int(self.quality[0].refused_in_a_row) / self.settings.sample_rate
-        if lasting < FAILED:
-            return ''
-        remedy = quality.REMEDIES[self.last_rejection.split(':')[0]]
-        return f'{self.last_rejection}, for {lasting:.0f} s: {remedy}'
+        before = self.last_stamp
+        estimate_column(
+            self.quality, self.state, self._settings, reason, estimates, stamp, *signals
+        )
+        self.note_column(reason, stamp, signals, before)
 
     @property
     def phase(self) -> str:
@@ -144,7 +130,7 @@ class Estimator:
         :return: for people; never "monitoring" while it does not monitor.
         """
         s, c = self.state[0], self.settings
-        if self.quality[0].counts[quality.ACCEPTED] == 0:
+        if not self.accepted:
             return 'waiting for the first good sample'
         if s.phase == PHASE_HOLD:
             return 'on hold: the input was interrupted, the filters settle'
@@ -156,7 +142,7 @@ class Estimator:
                     f'{still:.0f} s, a change of its friction cannot be seen'
                 )
             return 'monitoring'
-        share = f'learning, {100.0 * progress(self.state, self._settings):.0f} %'
+        share = f'learning, {100.0 * self.progress:.0f} %'
         if s.unsettled:
             return (
                 f'{share}: learning was refused {int(s.unsettled)} times because the valve '
@@ -184,19 +170,27 @@ class Estimator:
         """
         return self.state[0].phase in (PHASE_PAPER, PHASE_MONITOR)
 
-    def learned(self) -> dict[str, Any]:
+    @property
+    def progress(self) -> float:
+        """
+        Return the share of the learning that is done.
+
+        :return: 0..1.
+        """
+        return progress(self.state, self._settings)
+
+    def learned(self) -> Saved:
         """
         Return what was learned, to be kept over a restart.
 
         :return: plain numbers and lists by name, fit for JSON.
         :raises ValueError: where learning is not finished.
         """
-        accepted = self.quality[0].counts[quality.ACCEPTED]
-        if not (accepted if self.settings.mode == 'paper' else self.state[0].armed):
+        if not (self.accepted if self.settings.mode == 'paper' else self.state['armed'][0]):
             raise ValueError(f'nothing to save: {self.status}')
-        return {name: self.state[name][0].tolist() for name in LEARNED}
+        return State.plain(self.state, LEARNED)
 
-    def restore(self, learned: Mapping[str, Any]) -> None:
+    def restore(self, learned: Mapping[str, Plain]) -> None:
         """
         Take up what `learned` returned; go to MONITOR as soon as the filters have settled.
 
@@ -206,18 +200,10 @@ class Estimator:
         :raises ValueError: where it is not that, or beyond the bounds of the settings; the
             estimator is then untouched.
         """
+        read = State.read(learned, 'learned state', LEARNED)
         state = self.state.copy()
-        wrong = sorted(set(learned) ^ set(LEARNED))
-        if wrong:
-            raise ValueError(f'learned state: {", ".join(wrong)} missing or unknown')
-        for name, value in learned.items():
-            try:
-                array = np.asarray(value, float)
-            except (TypeError, ValueError, OverflowError) as error:
-                raise ValueError(f'learned state: {name} = {value!r}: {error}') from error
-            if array.shape != state[name].shape[1:] or not np.isfinite(array).all():
-                raise ValueError(f'learned state: {name} = {value!r} does not fit')
-            state[name][0] = array
+        for name in LEARNED:
+            state[name] = read[name]
         self._check_bounds(state)
         if self.settings.mode != 'paper':
             take_up(state)
@@ -236,7 +222,7 @@ class Estimator:
         self.state['start'] = self.state['elapsed']
         start(self.state, self._settings)
 
-    def _check_bounds(self, state: NDArray[Any]) -> None:
+    def _check_bounds(self, state: Array) -> None:
         s, c = state[0], self.settings
         for name, nominal in (('ah1', c.alpha1), ('ah4', c.alpha4), ('ah5', c.alpha5)):
             if abs(s[name] - nominal) > c.band * nominal * (1.0 + 1e-9):
@@ -255,11 +241,3 @@ class Estimator:
             f'friction {friction * force:+.0f} N, stiffness {100.0 * stiffness:+.1f} %, '
             f'offset {offset * force:+.0f} N'
         )
-
-    def _explain(self, reason: int, stamp: int, values: tuple[float, ...]) -> str:
-        name = quality.REASONS[reason]
-        if reason in (quality.NOT_FINITE, quality.OUT_OF_RANGE):
-            for index, value in enumerate(values):
-                if quality.judge_signal(self._settings, index, value) == reason:
-                    return f'{name}: {SIGNALS[index]} = {value:g}'
-        return f'{name}: {stamp} ns after {int(self.quality[0].stamp)} ns'

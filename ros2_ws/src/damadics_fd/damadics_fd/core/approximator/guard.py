@@ -13,33 +13,14 @@ way.
 """
 
 import math
-from typing import Any
 
 import numpy as np
 
 from damadics_fd.core.approximator import network
+from damadics_fd.core.approximator.state import FORCE, State
 from damadics_fd.core.jit import jit
-
-N = 3  # offset, relative change of the stiffness, friction / (K L)
-SUMS = 11  # weight, upper triangle of S, q, square of the left side
-STATE = [
-    ('place', 'f8'),
-    ('direction', 'f8'),
-    ('moved', 'i8'),
-    ('travel', 'f8'),
-    ('block', 'f8', (SUMS,)),
-    ('base', 'f8', (SUMS,)),
-    ('pool', 'f8', (SUMS,)),
-    ('block_end', 'i8'),
-    ('proven', 'f8'),
-    ('unsettled', 'i8'),
-    ('distance', 'f8'),
-    ('change', 'f8', (N,)),
-    ('theta', 'f8', (N,)),
-    ('cov', 'f8', (N, N)),
-    ('sigma', 'f8'),
-    ('drift', 'f8'),
-]
+from damadics_fd.core.record import Floats
+from damadics_fd.core.settings import Settings
 
 CORRELATION = 0.1  # s; samples closer than this count as one
 FRESH = 200_000_000  # ns after its last motion in which the stem counts as moving
@@ -51,7 +32,7 @@ CONFIDENCE = 3.5  # standard deviations
 
 
 @jit
-def track(s: Any, x: float, band: float) -> float:
+def track(s: State, x: float, band: float) -> float:
     """
     Follow the stem through a play, so that noise is no travel.
 
@@ -70,7 +51,7 @@ def track(s: Any, x: float, band: float) -> float:
 
 
 @jit
-def collect(s: Any, weight: float, x1: float, left: float) -> None:
+def collect(s: State, weight: float, x1: float, left: float) -> None:
     """
     Add a sample to the block.
 
@@ -94,7 +75,7 @@ def collect(s: Any, weight: float, x1: float, left: float) -> None:
 
 
 @jit
-def fit(b: Any, theta: Any, cov: Any) -> float:
+def fit(b: Floats, theta: Floats, cov: Floats) -> float:
     """
     Fit the force balance to the sums of a block.
 
@@ -107,71 +88,71 @@ def fit(b: Any, theta: Any, cov: Any) -> float:
     for _ in range(2):  # with the least sigma, then with the one found
         scale = 1.0 / (sigma * sigma)
         k = 1
-        for i in range(N):
-            for j in range(i, N):
+        for i in range(FORCE):
+            for j in range(i, FORCE):
                 cov[i, j] = cov[j, i] = b[k] * scale
                 k += 1
             cov[i, i] += 1.0 / (PRIOR[i] * PRIOR[i])
         invert(cov)
         left = b[10]
-        for i in range(N):
+        for i in range(FORCE):
             theta[i] = scale * (cov[i, 0] * b[7] + cov[i, 1] * b[8] + cov[i, 2] * b[9])
         k = 1
-        for i in range(N):
+        for i in range(FORCE):
             left -= 2.0 * theta[i] * b[7 + i]
-            for j in range(i, N):
+            for j in range(i, FORCE):
                 left += (1.0 if i == j else 2.0) * theta[i] * theta[j] * b[k]
                 k += 1
-        sigma = max(SIGMA_MIN, math.sqrt(max(left, 0.0) / max(b[0] - N, 1.0)))
+        sigma = max(SIGMA_MIN, math.sqrt(max(left, 0.0) / max(b[0] - FORCE, 1.0)))
     return sigma
 
 
 @jit
-def invert(a: Any) -> None:
+def invert(a: Floats) -> None:
     """
     Invert a symmetric positive definite matrix in place by Gauss-Jordan elimination.
 
     :param a: the matrix.
     """
-    for p in range(N):
+    for p in range(FORCE):
         pivot = 1.0 / a[p, p]
         a[p, p] = 1.0
-        for j in range(N):
+        for j in range(FORCE):
             a[p, j] *= pivot
-        for i in range(N):
+        for i in range(FORCE):
             if i != p:
                 factor = a[i, p]
                 a[i, p] = 0.0
-                for j in range(N):
+                for j in range(FORCE):
                     a[i, j] -= factor * a[p, j]
 
 
 @jit
-def compare(s: Any, c: Any) -> None:
+def compare(s: State, c: Settings) -> None:
     """
     Set the distance of the block from the first one, and the change of the parameters.
 
     :param s: state record: distance, change out.
     :param c: settings record: what change of offset, stiffness and friction is tolerated.
     """
-    theta, cov = np.zeros(N), np.zeros((N, N))
+    theta, cov = np.zeros(FORCE), np.zeros((FORCE, FORCE))
     fit(s.block, theta, cov)
-    for i in range(N):
+    for i in range(FORCE):
         s.change[i] = theta[i] - s.theta[i]
-        for j in range(N):
+        for j in range(FORCE):
             cov[i, j] += s.cov[i, j]
     cov[0, 0] += c.settled_stiffness * c.settled_stiffness / 4.0
     cov[1, 1] += c.settled_stiffness * c.settled_stiffness
     cov[2, 2] += c.settled_friction * c.settled_friction
     invert(cov)
     s.distance = 0.0
-    for i in range(N):
-        for j in range(N):
+    for i in range(FORCE):
+        for j in range(FORCE):
             s.distance += s.change[i] * cov[i, j] * s.change[j]
 
 
 @jit
-def close_block(s: Any, c: Any) -> bool:
+def close_block(s: State, c: Settings) -> bool:
     """
     End a block: keep it as the first one or compare it; add it to the pool of all.
 
@@ -197,7 +178,7 @@ def close_block(s: Any, c: Any) -> bool:
 
 
 @jit
-def foreseen(s: Any, stiffness: float, noise: float, low: float, high: float) -> float:
+def foreseen(s: State, stiffness: float, noise: float, low: float, high: float) -> float:
     """
     Return the force the approximator will have to explain in the worst place of the stroke.
 
@@ -221,7 +202,7 @@ def foreseen(s: Any, stiffness: float, noise: float, low: float, high: float) ->
 
 
 @jit
-def spread(s: Any, x1: float, d: float) -> float:
+def spread(s: State, x1: float, d: float) -> float:
     """
     Return the variance of the force that the fit predicts.
 
@@ -239,7 +220,7 @@ def spread(s: Any, x1: float, d: float) -> float:
 
 
 @jit
-def strays(s: Any, c: Any, dt: float, x1: float, left: float) -> bool:
+def strays(s: State, c: Settings, dt: float, x1: float, left: float) -> bool:
     """
     Tell whether the force has left the fit by more than friction and noise explain.
 

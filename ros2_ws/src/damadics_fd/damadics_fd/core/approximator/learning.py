@@ -2,9 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """State machine of monitor mode: INIT, LEARN_ALPHA, LEARN_PHI, MONITOR, and HOLD after a gap."""
 
-from typing import Any
-
 from damadics_fd.core.approximator import guard, network, observer
+from damadics_fd.core.approximator.state import State
 from damadics_fd.core.approximator.threshold import threshold
 from damadics_fd.core.jit import jit, layer
 from damadics_fd.core.modes import (
@@ -16,21 +15,8 @@ from damadics_fd.core.modes import (
     PHASE_MONITOR,
     PHASE_PAPER,
 )
+from damadics_fd.core.settings import Settings
 from damadics_fd.core.valve.plug import recovery
-
-STATE = [
-    ('elapsed', 'i8'),  # ns since the first sample, gaps that restart the filters left out
-    ('start', 'i8'),  # elapsed time at which learning began
-    ('held_until', 'i8'),  # elapsed time at which the filters have settled after a restart
-    ('armed', '?'),
-    ('phase', 'i8'),
-    ('trend', 'f8'),
-    ('noise', 'f8'),
-    ('rest', 'f8'),
-    ('rested', 'i8'),
-    ('exceeded', 'i8'),  # elapsed time at which an alarm would last have been near
-    *guard.STATE,
-]
 
 TREND = 0.1  # s; slower parts of the disturbance are no noise
 MEDIAN = 2.0  # s in which the median of the noise may grow e times
@@ -40,7 +26,7 @@ LEAST_NOISE = 1.0  # 1/s2; far below what moves the lowest threshold
 
 
 @jit
-def forget(s: Any, c: Any) -> None:
+def forget(s: State, c: Settings) -> None:
     """
     Forget what was learned and the travel seen, not the first block of the settled check.
 
@@ -58,7 +44,7 @@ def forget(s: Any, c: Any) -> None:
 
 
 @jit
-def arm(s: Any) -> None:
+def arm(s: State) -> None:
     """
     Monitor from now on with what the state has learned.
 
@@ -70,7 +56,7 @@ def arm(s: Any) -> None:
 
 
 @jit
-def guarded(c: Any) -> bool:
+def guarded(c: Settings) -> bool:
     """
     Tell whether there is a learning time in which the valve can be compared with itself.
 
@@ -81,7 +67,7 @@ def guarded(c: Any) -> bool:
 
 
 @jit
-def phase_of(s: Any, c: Any) -> int:
+def phase_of(s: State, c: Settings) -> int:
     """
     Return the phase; arm where the time is up, the stem has travelled and the valve is settled.
 
@@ -110,7 +96,7 @@ def phase_of(s: Any, c: Any) -> int:
 
 
 @jit
-def settle(s: Any, c: Any) -> bool:
+def settle(s: State, c: Settings) -> bool:
     """
     Close the block of the settled check when it is full; learn afresh where the valve changed.
 
@@ -131,7 +117,7 @@ def settle(s: Any, c: Any) -> bool:
 
 
 @jit
-def refuse(s: Any, c: Any) -> None:
+def refuse(s: State, c: Settings) -> None:
     """
     Learn again from the start, because the valve changes while it is learned.
 
@@ -144,7 +130,7 @@ def refuse(s: Any, c: Any) -> None:
 
 
 @jit
-def progress_of(s: Any, c: Any) -> float:
+def progress_of(s: State, c: Settings) -> float:
     """
     Return the share of the learning that is done.
 
@@ -161,7 +147,7 @@ def progress_of(s: Any, c: Any) -> float:
 
 
 @jit
-def watch_noise(s: Any, c: Any, dt: float) -> None:
+def watch_noise(s: State, c: Settings, dt: float) -> None:
     """
     Follow the median of the fast part of the disturbance (k2 + alpha1) xi2 + Phi sigm(xi2).
 
@@ -180,7 +166,7 @@ def watch_noise(s: Any, c: Any, dt: float) -> None:
 
 
 @jit
-def largest_noise(s: Any, c: Any) -> float:
+def largest_noise(s: State, c: Settings) -> float:
     """
     Return the standard deviation of the noise where it is largest, near the closed stop.
 
@@ -192,7 +178,7 @@ def largest_noise(s: Any, c: Any) -> float:
 
 
 @jit
-def least_bound(s: Any, c: Any) -> float:
+def least_bound(s: State, c: Settings) -> float:
     """
     Return the bound that keeps the noise of the sensors below the threshold.
 
@@ -206,7 +192,7 @@ def least_bound(s: Any, c: Any) -> float:
 
 
 @jit
-def excited(s: Any, c: Any) -> bool:
+def excited(s: State, c: Settings) -> bool:
     """
     Tell whether the stem has moved in such a way that what was learned holds from now on.
 
@@ -237,7 +223,7 @@ def excited(s: Any, c: Any) -> bool:
 
 
 @jit
-def gated(c: Any, x: float) -> bool:
+def gated(c: Settings, x: float) -> bool:
     """
     Tell whether a stop may push the stem or the plug force is too steep to be learned from.
 
@@ -249,7 +235,7 @@ def gated(c: Any, x: float) -> bool:
 
 
 @layer
-def adapt(s: Any, c: Any, phase: int, dt: float, x1: float, x2: float, u: float) -> None:
+def adapt(s: State, c: Settings, phase: int, dt: float, x1: float, x2: float, u: float) -> None:
     """
     Adapt by one step what the phase allows.
 
@@ -271,7 +257,7 @@ def adapt(s: Any, c: Any, phase: int, dt: float, x1: float, x2: float, u: float)
 
 
 @layer
-def follow(s: Any, c: Any, phase: int, dt: float) -> None:
+def follow(s: State, c: Settings, phase: int, dt: float) -> None:
     """
     Follow the travel of the stem and collect the settled check's block.
 

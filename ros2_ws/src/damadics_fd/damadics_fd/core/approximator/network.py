@@ -3,20 +3,9 @@
 """High-order neural network of equation (15): regressors S1, S2 with the printed sigmoids."""
 
 import math
-from typing import Any
 
+from damadics_fd.core.approximator.state import TERMS, Network
 from damadics_fd.core.jit import jit, layer
-
-N = 5  # terms in each regressor
-STATE = [
-    ('w1', 'f8', (N,)),
-    ('w2', 'f8', (N,)),
-    ('eps1', 'f8'),
-    ('b1', 'f8'),
-    ('S1', 'f8', (N,)),
-    ('S2', 'f8', (N,)),
-]
-
 
 M1, L1, C1, LAMBDA1 = 1.41, -10.0225, 0.5974, -2.11  # m, l, c, lambda of S1
 M2, L2, C2, LAMBDA2 = 0.8, -4.0, 2.119, -1.5  # of S2
@@ -47,7 +36,7 @@ def sigmoids(x2: float) -> tuple[float, float, float]:
 
 
 @jit
-def regress(s: Any, terms: tuple[float, float, float]) -> None:
+def regress(s: Network, terms: tuple[float, float, float]) -> None:
     """
     Set S1 and S2 of (15) for the sigmoids of a velocity.
 
@@ -63,13 +52,13 @@ def regress(s: Any, terms: tuple[float, float, float]) -> None:
     s.S1[3] = a * b
     s.S1[4] = b * b
     power = 1.0
-    for i in range(N):
+    for i in range(TERMS):
         power *= c
         s.S2[i] = power
 
 
 @jit
-def bound(s: Any, x2: float) -> float:
+def bound(s: Network, x2: float) -> float:
     """
     Return Phi of (15) for the regressors set by `regress`.
 
@@ -79,14 +68,14 @@ def bound(s: Any, x2: float) -> float:
     """
     fast = s.eps1
     slow = s.b1
-    for i in range(N):
+    for i in range(TERMS):
         fast += s.w1[i] * s.S1[i]
         slow += s.w2[i] * s.S2[i]
     return abs(x2) * fast + slow
 
 
 @layer
-def learn(s: Any, x2: float, step: float, w_max: float) -> None:
+def learn(s: Network, x2: float, step: float, w_max: float) -> None:
     """
     Adapt the weights of (15) by one Euler step, projected on a ball.
 
@@ -99,7 +88,7 @@ def learn(s: Any, x2: float, step: float, w_max: float) -> None:
     s.eps1 += fast
     s.b1 += step
     square = s.eps1 * s.eps1 + s.b1 * s.b1
-    for i in range(N):
+    for i in range(TERMS):
         s.w1[i] += fast * s.S1[i]
         s.w2[i] += step * s.S2[i]
         square += s.w1[i] * s.w1[i] + s.w2[i] * s.w2[i]
@@ -107,6 +96,6 @@ def learn(s: Any, x2: float, step: float, w_max: float) -> None:
         shrink = w_max / math.sqrt(square)
         s.eps1 *= shrink
         s.b1 *= shrink
-        for i in range(N):
+        for i in range(TERMS):
             s.w1[i] *= shrink
             s.w2[i] *= shrink

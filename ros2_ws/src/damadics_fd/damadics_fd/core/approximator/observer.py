@@ -2,28 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """The on-line approximator: observer (10), (11) and adaptive laws, step by step."""
 
-from typing import Any
-
 from damadics_fd.core.approximator import network
+from damadics_fd.core.approximator.state import Observer
 from damadics_fd.core.jit import jit, layer
+from damadics_fd.core.settings import Settings
 
-STATE = [
-    ('xh1', 'f8'),
-    ('xh2', 'f8'),
-    ('xi1', 'f8'),
-    ('xi2', 'f8'),
-    ('phi', 'f8'),
-    ('ah1', 'f8'),
-    ('ah4', 'f8'),
-    ('ah5', 'f8'),
-    *network.STATE,
-]
 STIFFEST = 2.5  # largest rate times step; Runge and Kutta's method is unstable from 2.78 on
 SHORTEST = 1e-9  # s
 
 
 @jit
-def begin(s: Any, c: Any) -> None:
+def begin(s: Observer, c: Settings) -> None:
     """
     Forget what was learned.
 
@@ -40,7 +29,7 @@ def begin(s: Any, c: Any) -> None:
 
 
 @jit
-def restart(s: Any, x1: float) -> None:
+def restart(s: Observer, x1: float) -> None:
     """
     Put the observer on a position at rest; what is learned stays.
 
@@ -54,7 +43,7 @@ def restart(s: Any, x1: float) -> None:
 
 
 @jit
-def observe(s: Any, c: Any, dt: float, x1: float, x2: float, u: float) -> None:
+def observe(s: Observer, c: Settings, dt: float, x1: float, x2: float, u: float) -> None:
     """
     Advance the observer (10), (11) by backward Euler in closed form: stable at any dt.
 
@@ -87,8 +76,8 @@ def observe(s: Any, c: Any, dt: float, x1: float, x2: float, u: float) -> None:
 
 @jit
 def slopes(
-    s: Any,
-    c: Any,
+    s: Observer,
+    c: Settings,
     pull: float,
     gain: float,
     phi: float,
@@ -120,7 +109,15 @@ def slopes(
 
 @layer
 def observe_printed(
-    s: Any, c: Any, dt: float, x1_0: float, x2_0: float, u_0: float, x1: float, x2: float, u: float
+    s: Observer,
+    c: Settings,
+    dt: float,
+    x1_0: float,
+    x2_0: float,
+    u_0: float,
+    x1: float,
+    x2: float,
+    u: float,
 ) -> None:
     """
     Advance the observer (10), (11) by one Runge-Kutta step, as the printed method was simulated.
@@ -180,7 +177,7 @@ def clip(value: float, nominal: float, band: float) -> float:
 
 
 @jit
-def adapt_alpha(s: Any, c: Any, dt: float, x1: float, u: float) -> None:
+def adapt_alpha(s: Observer, c: Settings, dt: float, x1: float, u: float) -> None:
     """
     Adapt the alphas by one step of their laws below (11), within their projection band.
 
@@ -198,7 +195,7 @@ def adapt_alpha(s: Any, c: Any, dt: float, x1: float, u: float) -> None:
 
 
 @layer
-def adapt_phi(s: Any, c: Any, dt: float, x2: float) -> None:
+def adapt_phi(s: Observer, c: Settings, dt: float, x2: float) -> None:
     """
     Adapt the weights and bounds in Phi by one step of their laws, outside the dead-zone only.
 

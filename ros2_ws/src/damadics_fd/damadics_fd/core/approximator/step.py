@@ -2,95 +2,27 @@
 # SPDX-License-Identifier: Apache-2.0
 """The estimator's step: check, filter, observe, learn; compiled."""
 
-from typing import Any, NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from damadics_fd.core import quality
 from damadics_fd.core.approximator import learning, observer, transmitter, velocity
+from damadics_fd.core.approximator.state import Estimate, State
 from damadics_fd.core.jit import jit, layer
 from damadics_fd.core.modes import MONITOR, PAPER, PHASE_PAPER
+from damadics_fd.core.quality import Quality
+from damadics_fd.core.record import Floats, Ints, Rows
+from damadics_fd.core.settings import Settings
 from damadics_fd.core.valve import force
 
 SUBSTEPS = 1000  # at most, in one gap
 LARGEST_K2_DT = 1.5  # step of the printed observer, which is unstable from 2.8 on
-ESTIMATE = np.dtype(
-    (
-        np.record,
-        np.dtype(
-            [
-                ('stamp', 'i8'),
-                ('x2', 'f8'),
-                ('x1_hat', 'f8'),
-                ('x2_hat', 'f8'),
-                ('xi1', 'f8'),
-                ('xi2', 'f8'),
-                ('phi', 'f8'),
-                ('alpha1', 'f8'),
-                ('alpha4', 'f8'),
-                ('alpha5', 'f8'),
-                ('x1', 'f8'),
-                ('u', 'f8'),
-                ('ps', 'f8'),
-                ('dp', 'f8'),
-                ('progress', 'f8'),
-                ('phase', 'i8'),
-            ]
-        ),
-    )
-)
-STATE = np.dtype(
-    (
-        np.record,
-        np.dtype(
-            [
-                *learning.STATE,
-                *velocity.STATE,
-                *observer.STATE,
-                *transmitter.STATE,
-            ],
-            align=True,
-        ),
-    )
-)
-LEARNED = ('ah1', 'ah4', 'ah5', 'w1', 'w2', 'eps1', 'b1', 'base', 'theta', 'cov', 'sigma')
-
-
-class Estimate(NamedTuple):
-    """Hold one result of the estimator, with the fields of damadics_msgs/Estimate."""
-
-    stamp: int  # ns
-    x2: float
-    x1_hat: float
-    x2_hat: float
-    xi1: float
-    xi2: float
-    phi: float
-    alpha1: float
-    alpha4: float
-    alpha5: float
-    x1: float
-    u: float
-    ps: float
-    dp: float
-    progress: float
-    phase: int
-
-    @property
-    def alpha_hat(self) -> tuple[float, float, float]:
-        """
-        Return the estimates of alpha1, alpha4, alpha5.
-
-        :return: [1/s, 1/s2, 1/s2].
-        """
-        return self.alpha1, self.alpha4, self.alpha5
 
 
 @layer
 def advance(
-    s: Any,
-    c: Any,
+    s: State,
+    c: Settings,
     phase: int,
     dt: float,
     x1_0: float,
@@ -123,10 +55,10 @@ def advance(
 
 @jit
 def step(
-    q: Any,
-    s: Any,
-    c: Any,
-    e: Any,
+    q: Quality,
+    s: State,
+    c: Settings,
+    e: Estimate,
     stamp: int,
     cv: float,
     x1: float,
@@ -226,10 +158,10 @@ def step(
 
 @jit
 def update(
-    q: NDArray,
-    s: NDArray,
-    c: NDArray,
-    e: NDArray,
+    q: Rows[Quality],
+    s: Rows[State],
+    c: Rows[Settings],
+    e: Rows[Estimate],
     stamp: int,
     cv: float,
     x1: float,
@@ -253,7 +185,50 @@ def update(
 
 
 @jit
-def start(s: NDArray, c: NDArray) -> None:
+def estimate_column(
+    q: Rows[Quality],
+    s: Rows[State],
+    c: Rows[Settings],
+    reason: NDArray[np.uint8],
+    e: Rows[Estimate],
+    stamp: Ints,
+    cv: Floats,
+    x1: Floats,
+    p1: Floats,
+    p2: Floats,
+    t1: Floats,
+    flow: Floats,
+    ps: Floats,
+) -> None:
+    """
+    Take a column of samples.
+
+    :param q: quality state.
+    :param s: estimator state.
+    :param c: settings.
+    :param reason: written: ACCEPTED or the reason of refusal.
+    :param e: estimates, written; rows of refused samples stay as they are.
+    :param stamp: the rest are columns of the signals as in `step`.
+    """
+    for i in range(len(stamp)):
+        reason[i] = step(
+            q[0],
+            s[0],
+            c[0],
+            e[i],
+            stamp[i],
+            cv[i],
+            x1[i],
+            p1[i],
+            p2[i],
+            t1[i],
+            flow[i],
+            ps[i],
+        )
+
+
+@jit
+def start(s: Rows[State], c: Rows[Settings]) -> None:
     """
     Set an estimator state to "nothing learned".
 
@@ -264,7 +239,7 @@ def start(s: NDArray, c: NDArray) -> None:
 
 
 @jit
-def take_up(s: NDArray) -> None:
+def take_up(s: Rows[State]) -> None:
     """
     Go to MONITOR with what the state has learned, as soon as the filters have settled.
 
@@ -274,7 +249,7 @@ def take_up(s: NDArray) -> None:
 
 
 @jit
-def progress(s: NDArray, c: NDArray) -> float:
+def progress(s: Rows[State], c: Rows[Settings]) -> float:
     """
     Return the share of the learning that is done.
 

@@ -2,15 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """The adaptive threshold rho on the residual |xi2|, equation (16)."""
 
-from typing import Any
-
 from damadics_fd.core.jit import jit
+from damadics_fd.core.settings import Settings
 
 PAPER_RHO, FLOOR_RHO = range(2)
 
 
 @jit
-def threshold(c: Any, phi: float, ah1: float) -> float:
+def threshold(c: Settings, phi: float, ah1: float) -> float:
     """
     Return the threshold for a learned bound.
 

@@ -3,16 +3,15 @@
 """Delay the other signals as the damped transmitter of the chamber pressure delays its own."""
 
 import math
-from typing import Any
 
+from damadics_fd.core.approximator.state import Transmitter
 from damadics_fd.core.jit import jit
-
-STATE = [('late_x1', 'f8'), ('late_p1', 'f8'), ('late_p2', 'f8')]
+from damadics_fd.core.settings import Settings
 
 
 @jit
 def delay(
-    s: Any, c: Any, afresh: bool, dt: float, x1: float, p1: float, p2: float
+    s: Transmitter, c: Settings, afresh: bool, dt: float, x1: float, p1: float, p2: float
 ) -> tuple[float, float, float]:
     """
     Pass position and process pressures through the first-order lag of `ps`.

@@ -8,31 +8,16 @@ x2 = d/dt H y, so that the filter's lag leaves no error in the plant equation (4
 """
 
 import math
-from typing import Any
 
+from damadics_fd.core.approximator.state import Velocity
 from damadics_fd.core.jit import jit
+from damadics_fd.core.settings import Settings
 
 HIGH_PASS, KALMAN, SUPER_TWISTING = range(3)
-STATE = [
-    ('y', 'f8'),
-    ('v', 'f8'),
-    ('y_raw', 'f8'),
-    ('y_lag', 'f8'),
-    ('u_raw', 'f8'),
-    ('uy', 'f8'),
-    ('uv', 'f8'),
-    ('dt', 'f8'),
-    ('gain', 'f8'),
-    ('gain_v', 'f8'),
-    ('lag', 'f8'),
-    ('x1', 'f8'),
-    ('x2', 'f8'),
-    ('u', 'f8'),
-]
 
 
 @jit
-def restart(s: Any, y: float) -> None:
+def restart(s: Velocity, y: float) -> None:
     """
     Put the filters on a position at rest; `restart_input` does so for the input.
 
@@ -48,7 +33,7 @@ def restart(s: Any, y: float) -> None:
 
 
 @jit
-def restart_input(s: Any, u: float) -> None:
+def restart_input(s: Velocity, u: float) -> None:
     """
     Put the filters of the input on a constant.
 
@@ -60,7 +45,7 @@ def restart_input(s: Any, u: float) -> None:
 
 
 @jit
-def tune_kalman(s: Any, c: Any, dt: float) -> None:
+def tune_kalman(s: Velocity, c: Settings, dt: float) -> None:
     """
     Set the gains of the steady-state Kalman filter for a time step.
 
@@ -83,7 +68,7 @@ def tune_kalman(s: Any, c: Any, dt: float) -> None:
 
 
 @jit
-def filter_position(s: Any, c: Any, dt: float, y: float) -> float:
+def filter_position(s: Velocity, c: Settings, dt: float, y: float) -> float:
     """
     Pass one position through the velocity estimator.
 
@@ -122,7 +107,7 @@ def filter_position(s: Any, c: Any, dt: float, y: float) -> float:
 
 
 @jit
-def super_twist(s: Any, c: Any, dt: float, y: float) -> None:
+def super_twist(s: Velocity, c: Settings, dt: float, y: float) -> None:
     """
     Advance Levant's super-twisting differentiator by an implicit step (no chatter).
 
@@ -148,7 +133,7 @@ def super_twist(s: Any, c: Any, dt: float, y: float) -> None:
 
 
 @jit
-def filter_input(s: Any, c: Any, dt: float, u: float) -> None:
+def filter_input(s: Velocity, c: Settings, dt: float, u: float) -> None:
     """
     Pass the input through the same low-pass as the position.
 

@@ -3,10 +3,12 @@
 """Life of an alarm: delays, latch, acknowledge, reset, shelve, near misses, chatter."""
 
 import math
-from typing import Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from damadics_fd.core.jit import jit
 from damadics_fd.core.modes import PHASE_HOLD
+from damadics_fd.core.record import Ints, Record
+from damadics_fd.core.settings import Settings
 
 # transitions, numbered as in damadics_msgs/FaultEvent
 TRANSITIONS = (
@@ -45,27 +47,32 @@ NE107 = ('normal', 'maintenance required', 'out of specification', 'function che
 
 RECENT = 16  # alarms remembered for the chatter count
 MINUTE = 60_000_000_000
-STATE = [
-    ('stamp', 'i8'),
-    ('active', '?'),
-    ('latched', '?'),
-    ('acknowledged', '?'),
-    ('flag', '?'),
-    ('worst', 'i8'),
-    ('occurrence', 'i8'),
-    ('since', 'i8'),
-    ('onset', 'i8'),
-    ('peak', 'f8'),
-    ('pending', 'i8'),
-    ('last_decision', 'i8'),
-    ('excursion', 'i8'),
-    ('excursion_peak', 'f8'),
-    ('near_misses', 'i8'),
-    ('chatter', '?'),
-    ('recent', 'i8', (RECENT,)),
-    ('shelved_until', 'i8'),
-    ('unknown', '?'),  # the alarm of before a restart is lost
-]
+
+
+class Alarm(Record):
+    """Remember the life of the present alarm and of those before."""
+
+    stamp: int
+    active: bool
+    latched: bool
+    acknowledged: bool
+    flag: bool
+    worst: int
+    occurrence: int
+    since: int
+    onset: int
+    peak: float
+    pending: int
+    last_decision: int
+    excursion: int
+    excursion_peak: float
+    near_misses: int
+    chatter: bool
+    recent: Annotated[Ints, RECENT]
+    shelved_until: int
+    unknown: bool  # the alarm of before a restart is lost
+
+
 NEVER = -1
 LONGEST_SHELF = 30 * 86400.0  # s
 
@@ -78,7 +85,7 @@ class Answer(NamedTuple):
     transitions: int = 0  # bit n: transition n
 
 
-def begin(a: Any) -> None:
+def begin(a: Alarm) -> None:
     """
     Set an alarm record to "nothing has happened".
 
@@ -102,7 +109,7 @@ def severity(level: int) -> int:
 
 
 @jit
-def raise_alarm(a: Any, c: Any, stamp: int, level: int) -> None:
+def raise_alarm(a: Alarm, c: Settings, stamp: int, level: int) -> None:
     """
     Make the alarm active as a new occurrence.
 
@@ -124,7 +131,9 @@ def raise_alarm(a: Any, c: Any, stamp: int, level: int) -> None:
 
 
 @jit
-def judge(a: Any, c: Any, stamp: int, exceed: bool, busy: bool, level: int, ratio: float) -> int:
+def judge(
+    a: Alarm, c: Settings, stamp: int, exceed: bool, busy: bool, level: int, ratio: float
+) -> int:
     """
     Take one decision of an armed detector.
 
@@ -172,7 +181,14 @@ def judge(a: Any, c: Any, stamp: int, exceed: bool, busy: bool, level: int, rati
 
 @jit
 def step(
-    a: Any, c: Any, stamp: int, armed: bool, exceed: bool, busy: bool, level: int, ratio: float
+    a: Alarm,
+    c: Settings,
+    stamp: int,
+    armed: bool,
+    exceed: bool,
+    busy: bool,
+    level: int,
+    ratio: float,
 ) -> int:
     """
     Take one decision.
@@ -210,7 +226,7 @@ def step(
 
 
 @jit
-def refresh(a: Any) -> None:
+def refresh(a: Alarm) -> None:
     """
     Set the flag from the state, and the stamp of its last change.
 
@@ -223,7 +239,7 @@ def refresh(a: Any) -> None:
 
 
 @jit
-def state_of(a: Any, armed: bool, phase: int) -> int:
+def state_of(a: Alarm, armed: bool, phase: int) -> int:
     """
     Return the state that is shown.
 
@@ -246,7 +262,7 @@ def state_of(a: Any, armed: bool, phase: int) -> int:
 
 
 @jit
-def level_of(a: Any, armed: bool) -> int:
+def level_of(a: Alarm, armed: bool) -> int:
     """
     Return the NAMUR NE 107 level that is shown.
 
@@ -259,7 +275,7 @@ def level_of(a: Any, armed: bool) -> int:
     return FUNCTION_CHECK if a.shelved_until > 0 or a.unknown or not armed else NORMAL
 
 
-def acknowledge(a: Any, occurrence: int | None = None) -> Answer:
+def acknowledge(a: Alarm, occurrence: int | None = None) -> Answer:
     """
     Note that a person has seen the alarm.
 
@@ -280,7 +296,7 @@ def acknowledge(a: Any, occurrence: int | None = None) -> Answer:
     return Answer(True, f'alarm {a.occurrence} acknowledged', 1 << ACKNOWLEDGED)
 
 
-def lose(a: Any) -> None:
+def lose(a: Alarm) -> None:
     """
     Begin without the alarm of before, which nobody can tell; until a person says otherwise.
 
@@ -289,7 +305,7 @@ def lose(a: Any) -> None:
     a.unknown = True
 
 
-def reset(a: Any) -> Answer:
+def reset(a: Alarm) -> Answer:
     """
     Release the latch of an alarm whose condition has gone, after repair or inspection.
 
@@ -313,7 +329,7 @@ def reset(a: Any) -> Answer:
     return Answer(True, f'alarm {a.occurrence} reset', seen | 1 << RESET)
 
 
-def shelve(a: Any, seconds: float) -> Answer:
+def shelve(a: Alarm, seconds: float) -> Answer:
     """
     Mask the alarm for a time; what happens meanwhile is recorded and shown afterwards.
 
@@ -330,7 +346,7 @@ def shelve(a: Any, seconds: float) -> Answer:
     return Answer(True, f'alarms shelved for {seconds:g} s', 1 << SHELVED)
 
 
-def unshelve(a: Any) -> Answer:
+def unshelve(a: Alarm) -> Answer:
     """
     End a shelf before its time.
 

@@ -3,46 +3,24 @@
 """The detector: one estimate in, one decision out."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from operator import attrgetter
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from damadics_fd.core.approximator.step import ESTIMATE, Estimate
+from damadics_fd.core.approximator.state import Estimate
 from damadics_fd.core.decision import alarm
 from damadics_fd.core.decision import saved as saved_state
-from damadics_fd.core.decision.events import Event, events_of
-from damadics_fd.core.decision.judge import DECISION, STATE, judge, show
+from damadics_fd.core.decision.events import Decision, Event
+from damadics_fd.core.decision.judge import State, judge, show
+from damadics_fd.core.record import Array, Plain, Saved
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.signature.signature import Signature
 from damadics_fd.core.signature.state import NO_CLASSES, SignatureSettings
 
 ACCEPTED = np.zeros(1, np.uint8)
-
-
-class Decision(NamedTuple):
-    """Hold one judgement of the detector; stamps in ns, states as in damadics_msgs/FaultFlag."""
-
-    stamp: int
-    residual: float  # |xi2| [1/s]
-    threshold: float  # rho [1/s]
-    ratio: float  # residual / threshold
-    exceed: bool  # the residual counts and is not below the threshold
-    fault: bool  # a fault is flagged
-    state: int
-    level: int  # NAMUR NE 107
-    since: int  # last change of `fault`
-    onset: int  # estimated onset of the fault, 0 while there is none
-    occurrence: int  # faults flagged since the start
-    acknowledged: bool
-    peak: float  # largest ratio of this fault
-    still: float  # time since the stem last moved by 1 % of its stroke [s]
-    cause: int  # as in damadics_msgs/Signature
-    strength: float  # change in the unit of the cause, 0 if unknown
-    spread: float  # its standard deviation, 0 if unknown
-    confidence: float  # probability of the cause, 0 if unknown
-    transitions: int  # bit n: transition n of damadics_msgs/FaultEvent
-    events: Sequence[Event] = ()
+_VALUES = attrgetter(*Estimate.names())
 
 
 class Outcome(NamedTuple):
@@ -59,22 +37,23 @@ class Detector:
 
     :param settings: all settings, the same as those of the estimator.
     :param classes: least NAMUR NE 107 class of an alarm by its cause, in the order of
-        `signature_types.CAUSES`; without it the class tells the size of the residual alone.
+        `signature.state.CAUSES`; without it the class tells the size of the residual alone.
     """
 
     def __init__(self, settings: Settings, classes: Sequence[int] = NO_CLASSES) -> None:
         self.settings = settings
-        self.state = np.zeros(1, STATE)
+        self.state = State.rows()
         self.signature = Signature(SignatureSettings.of(settings, classes))
         self._settings = settings.record()
-        self._estimate = np.zeros(1, ESTIMATE)
-        self._decision = np.zeros(1, DECISION)
+        self._estimate = Estimate.rows()
+        self._decision = Decision.rows()  # the latest
+        self._rows = Decision.rows()
         self.reset()
 
     def reset(self) -> None:
         """Forget everything, alarms too."""
-        self.state[:] = np.zeros(1, STATE)
-        self._decision[:] = np.zeros(1, DECISION)
+        self.state[:] = State.rows()
+        self._decision[:] = Decision.rows()
         self.signature.relearn()
         alarm.begin(self.state[0])
         self.state['moved'] = -1
@@ -84,17 +63,17 @@ class Detector:
         Judge one estimate.
 
         :param estimate: what the estimator returned.
-        :return: the decision; `events` holds the transitions of the alarm at this sample.
+        :return: the decision; its `events` are the transitions of the alarm at this sample.
         """
-        self._estimate[0] = estimate
-        self.judge(ACCEPTED, self._estimate, self._decision)
+        self._estimate[0] = _VALUES(estimate)
+        self.judge(ACCEPTED, self._estimate, self._rows)
         return self.decision
 
     def judge(
         self,
         reason: NDArray[np.uint8],
-        estimates: NDArray[Any],
-        decisions: NDArray[Any],
+        estimates: Array,
+        decisions: Array,
         keep: bool = True,
         first: int = 0,
     ) -> tuple[int, int]:
@@ -109,7 +88,7 @@ class Detector:
         :param first: row to begin with.
         :return: the row after the last one, and the number of decisions with a transition.
         """
-        done: tuple[int, int] = judge(
+        done, kept = judge(
             self.state,
             self._settings,
             self.signature.state,
@@ -117,10 +96,14 @@ class Detector:
             reason,
             estimates,
             decisions,
+            self._decision,
             keep,
             first,
         )
-        return done
+        judged = np.flatnonzero(reason[first:done] == 0)
+        if len(judged):
+            self._estimate[0] = estimates[first + judged[-1]]
+        return done, kept
 
     @property
     def decision(self) -> Decision:
@@ -129,8 +112,7 @@ class Detector:
 
         :return: the decision.
         """
-        result = Decision(*self._decision.item())
-        return result._replace(events=events_of(result)) if result.transitions else result
+        return Decision(*self._decision.item())
 
     @property
     def statistics(self) -> dict[str, int]:
@@ -180,32 +162,24 @@ class Detector:
         """
         return self._outcome(alarm.unshelve(self.state[0]))
 
-    def save(self) -> dict[str, Any]:
+    def save(self) -> Saved:
         """
         Return the state, alarms included, to be kept over a restart.
 
         :return: plain numbers and lists by name, fit for JSON.
         """
-        return {name: self.state[name][0].tolist() for name in STATE.names or ()}
+        return State.plain(self.state)
 
-    def load(self, saved: Mapping[str, Any]) -> None:
+    def load(self, saved: Mapping[str, Plain]) -> None:
         """
         Take up a state that `save` returned; the alarm goes on where it was.
 
         :param saved: the state.
         :raises ValueError: where it is not such a state; the present one is then untouched.
         """
-        state = np.zeros(1, STATE)
         values = saved_state.complete(saved)
-        wrong = sorted(set(values) ^ set(STATE.names or ()))
-        if wrong:
-            raise ValueError(f'alarm state: {", ".join(wrong)} missing or unknown')
+        state = State.read(values, 'alarm state')
         saved_state.check(values)
-        for name, value in values.items():
-            try:
-                state[name][0] = value
-            except (TypeError, ValueError, OverflowError) as error:
-                raise ValueError(f'alarm state: {name} does not fit: {error}') from error
         self.state[:] = state
         self._show(0)
 
@@ -219,7 +193,7 @@ class Detector:
         if not answer.transitions:
             return Outcome(answer.done, answer.text, ())
         self._show(answer.transitions)
-        return Outcome(answer.done, answer.text, tuple(self.decision.events))
+        return Outcome(answer.done, answer.text, self.decision.events)
 
     def _show(self, transitions: int) -> None:
         show(

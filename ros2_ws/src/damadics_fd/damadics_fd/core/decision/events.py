@@ -1,10 +1,9 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Transitions of an alarm with their evidence, as damadics_msgs/FaultEvent carries them."""
+"""A decision, and the transitions of the alarm in it, as damadics_msgs/FaultEvent carries them."""
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 from damadics_fd.core.decision.alarm import (
     CHANGED,
@@ -21,6 +20,7 @@ from damadics_fd.core.decision.alarm import (
     TRANSITIONS,
     UNSHELVED,
 )
+from damadics_fd.core.record import Record
 from damadics_fd.core.signature.state import CAUSES, known
 
 STUCK = 5.0  # s without motion that are worth a word in the text of an alarm
@@ -63,18 +63,51 @@ class Event:
         return TRANSITIONS[self.transition]
 
 
-def events_of(decision: Any) -> tuple[Event, ...]:
-    """
-    List the transitions in a decision.
+@dataclass
+class Decision(Record):
+    """Hold one judgement of the detector; stamps in ns, states as in damadics_msgs/FaultFlag."""
 
-    :param decision: a `Decision`.
-    :return: one event per transition, with the evidence.
-    """
-    bits = int(decision.transitions)
-    return tuple(_event(n, decision) for n in range(len(TRANSITIONS)) if bits >> n & 1)
+    stamp: int
+    residual: float  # |xi2| [1/s]
+    threshold: float  # rho [1/s]
+    ratio: float  # residual / threshold
+    exceed: bool  # the residual counts and is not below the threshold
+    fault: bool  # a fault is flagged
+    state: int
+    level: int  # NAMUR NE 107
+    since: int  # last change of `fault`
+    onset: int  # estimated onset of the fault, 0 while there is none
+    occurrence: int  # faults flagged since the start
+    acknowledged: bool
+    peak: float  # largest ratio of this fault
+    still: float  # time since the stem last moved by 1 % of its stroke [s]
+    cause: int  # as in damadics_msgs/Signature
+    strength: float  # change in the unit of the cause, 0 if unknown
+    spread: float  # its standard deviation, 0 if unknown
+    confidence: float  # probability of the cause, 0 if unknown
+    transitions: int  # bit n: transition n of damadics_msgs/FaultEvent
+
+    @property
+    def shown(self) -> tuple[bool, int, int]:
+        """
+        Return what a flag shows: whoever shows it does so anew where this has changed.
+
+        :return: fault, state, level.
+        """
+        return self.fault, self.state, self.level
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """
+        List the transitions of the alarm at this sample.
+
+        :return: one event per transition, with the evidence.
+        """
+        bits = int(self.transitions)
+        return tuple(_event(n, self) for n in range(len(TRANSITIONS)) if bits >> n & 1)
 
 
-def _event(transition: int, d: Any) -> Event:
+def _event(transition: int, d: Decision) -> Event:
     strength, spread, confidence = known(d.strength, d.spread, d.confidence)
     duration = max(int(d.stamp) - int(d.onset), 0) * 1e-9 if d.onset else 0.0
     return Event(
@@ -96,7 +129,7 @@ def _event(transition: int, d: Any) -> Event:
     )
 
 
-def _text(transition: int, d: Any, duration: float) -> str:
+def _text(transition: int, d: Decision, duration: float) -> str:
     name = TRANSITIONS[transition].replace('_', ' ')
     unnumbered = transition in (SHELVED, UNSHELVED, NEAR_MISS) or not d.occurrence
     number = '' if unnumbered else f' {int(d.occurrence)}'
@@ -113,7 +146,7 @@ def _text(transition: int, d: Any, duration: float) -> str:
     return text
 
 
-def _advice(transition: int, d: Any) -> str:
+def _advice(transition: int, d: Decision) -> str:
     if transition in (RAISED, CHANGED):
         return ADVICE[int(d.level)]
     if transition == CLEARED:

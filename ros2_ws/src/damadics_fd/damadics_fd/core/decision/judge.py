@@ -7,62 +7,32 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from damadics_fd.core.approximator.state import Estimate
 from damadics_fd.core.approximator.threshold import threshold
 from damadics_fd.core.decision import alarm, vote
+from damadics_fd.core.decision.alarm import Alarm
+from damadics_fd.core.decision.events import Decision
+from damadics_fd.core.decision.vote import Votes
 from damadics_fd.core.jit import jit, layer
 from damadics_fd.core.modes import PHASE_HOLD, PHASE_PAPER
+from damadics_fd.core.record import Array, Rows
+from damadics_fd.core.settings import Settings
 from damadics_fd.core.signature import step as signature_step
 
 LARGE = 1e9  # ratio to a threshold of zero
-DECISION = np.dtype(
-    (
-        np.record,
-        np.dtype(
-            [
-                ('stamp', 'i8'),
-                ('residual', 'f8'),
-                ('threshold', 'f8'),
-                ('ratio', 'f8'),
-                ('exceed', '?'),
-                ('fault', '?'),
-                ('state', 'i8'),
-                ('level', 'i8'),
-                ('since', 'i8'),
-                ('onset', 'i8'),
-                ('occurrence', 'i8'),
-                ('acknowledged', '?'),
-                ('peak', 'f8'),
-                ('still', 'f8'),
-                ('cause', 'i8'),
-                ('strength', 'f8'),
-                ('spread', 'f8'),
-                ('confidence', 'f8'),
-                ('transitions', 'i8'),
-            ],
-            align=True,
-        ),
-    )
-)
-STATE = np.dtype(
-    (
-        np.record,
-        np.dtype(
-            [
-                *vote.STATE,
-                *alarm.STATE,
-                ('place', 'f8'),
-                ('moved', 'i8'),
-                ('told', 'i8'),
-            ],
-            align=True,
-        ),
-    )
-)
 STIR = 0.01  # of the stroke: less is no motion of the stem
 
 
+class State(Votes, Alarm):
+    """Remember what the detector knows of the valve: votes, alarm, motion."""
+
+    place: float
+    moved: int
+    told: int
+
+
 @layer
-def step(s: Any, c: Any, g: Any, gc: Any, e: Any, d: Any) -> None:
+def step(s: State, c: Settings, g: Any, gc: Any, e: Estimate, d: Decision) -> None:
     """
     Judge one estimate.
 
@@ -118,7 +88,7 @@ def step(s: Any, c: Any, g: Any, gc: Any, e: Any, d: Any) -> None:
 
 
 @jit
-def class_of(s: Any, g: Any, gc: Any, armed: bool) -> int:
+def class_of(s: State, g: Any, gc: Any, armed: bool) -> int:
     """
     Return the NAMUR NE 107 class that is shown: the worse of residual and cause.
 
@@ -137,7 +107,7 @@ def class_of(s: Any, g: Any, gc: Any, armed: bool) -> int:
 
 
 @jit
-def report(s: Any, g: Any, gc: Any, e: Any, d: Any) -> None:
+def report(s: State, g: Any, gc: Any, e: Estimate, d: Decision) -> None:
     """
     Copy the state of the alarm into a decision.
 
@@ -166,13 +136,14 @@ def report(s: Any, g: Any, gc: Any, e: Any, d: Any) -> None:
 
 @jit
 def judge(
-    s: NDArray,
-    c: NDArray,
+    s: Rows[State],
+    c: Rows[Settings],
     g: NDArray,
     gc: NDArray,
-    reason: NDArray,
-    e: NDArray,
-    d: NDArray,
+    reason: NDArray[np.uint8],
+    e: Rows[Estimate],
+    d: Array,
+    latest: Rows[Decision],
     keep: bool,
     first: int,
 ) -> tuple[int, int]:
@@ -186,29 +157,36 @@ def judge(
     :param reason: 0 where there is an estimate.
     :param e: estimates.
     :param d: decisions, written where there is an estimate.
+    :param latest: the last decision, in an array of length 1, written.
     :param keep: keep a row for each; otherwise only decisions with a transition, as many as
         there is room for.
     :param first: row to begin with.
     :return: the row after the last one, and the number of decisions with a transition.
     """
     kept = 0
+    last = -1
+    done = len(e)
     for i in range(first, len(e)):
         if reason[i] != 0:
             continue
-        row = i if keep else kept
-        step(s[0], c[0], g[0], gc[0], e[i], d[row])
-        news = d[row].transitions != 0
+        last = i
+        step(s[0], c[0], g[0], gc[0], e[i], latest[0])
+        news = latest[0].transitions != 0
         if keep or news:
-            report(s[0], g[0], gc[0], e[i], d[row])
+            report(s[0], g[0], gc[0], e[i], latest[0])
+            d[i if keep else kept] = latest[0]
         if news:
             kept += 1
             if not keep and kept == len(d):
-                return i + 1, kept
-    return len(e), kept
+                done = i + 1
+                break
+    if last >= 0 and not keep:
+        report(s[0], g[0], gc[0], e[last], latest[0])
+    return done, kept
 
 
 @jit
-def show(s: NDArray, g: NDArray, gc: NDArray, e: NDArray, d: NDArray) -> None:
+def show(s: Rows[State], g: NDArray, gc: NDArray, e: Rows[Estimate], d: Rows[Decision]) -> None:
     """
     Copy the state of the alarm into a decision; `report` for arrays of length 1.
 

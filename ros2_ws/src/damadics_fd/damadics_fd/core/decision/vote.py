@@ -2,13 +2,22 @@
 # SPDX-License-Identifier: Apache-2.0
 """From residual and threshold to a decision: end-stop gates and M of N samples at three levels."""
 
-from typing import Any
+from typing import Annotated
 
+from damadics_fd.core.approximator.state import Estimate
 from damadics_fd.core.jit import jit
 from damadics_fd.core.modes import PHASE_MONITOR, PHASE_PAPER
+from damadics_fd.core.record import Ints, Record
+from damadics_fd.core.settings import Settings
 
 LEVELS = 3
-STATE = [('history', 'i8', (LEVELS,)), ('count', 'i8', (LEVELS,))]
+
+
+class Votes(Record):
+    """Say which of the last samples exceeded, at each level."""
+
+    history: Annotated[Ints, LEVELS]
+    count: Annotated[Ints, LEVELS]
 
 
 @jit
@@ -23,7 +32,7 @@ def armed(phase: int) -> bool:
 
 
 @jit
-def gated(c: Any, e: Any) -> bool:
+def gated(c: Settings, e: Estimate) -> bool:
     """
     Tell whether an end stop may be what pushes the residual.
 
@@ -41,7 +50,7 @@ def gated(c: Any, e: Any) -> bool:
 
 
 @jit
-def clear(s: Any) -> None:
+def clear(s: Votes) -> None:
     """
     Forget the samples seen.
 
@@ -53,7 +62,7 @@ def clear(s: Any) -> None:
 
 
 @jit
-def vote(s: Any, c: Any, exceed: bool, ratio: float) -> int:
+def vote(s: Votes, c: Settings, exceed: bool, ratio: float) -> int:
     """
     Count the sample in and return the level that M of the last N samples have reached.
 

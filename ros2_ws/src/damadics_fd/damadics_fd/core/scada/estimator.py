@@ -3,33 +3,28 @@
 """The SCADA-rate monitor in the place of the estimator: same samples, same alarm life."""
 
 import math
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from damadics_fd.core import quality
-from damadics_fd.core.approximator.estimator import Estimator
-from damadics_fd.core.approximator.step import Estimate
-from damadics_fd.core.modes import PHASE_HOLD, PHASE_INIT, PHASE_LEARN_PHI, PHASE_MONITOR
+from damadics_fd.core.approximator.state import Estimate
+from damadics_fd.core.intake import Intake
+from damadics_fd.core.modes import PHASE_HOLD, PHASE_INIT, PHASE_LEARN_PHI, PHASE_MONITOR, PHASES
+from damadics_fd.core.quality import Refused
+from damadics_fd.core.record import Array, Floats, Ints, Plain, Saved
+from damadics_fd.core.scada.kernel import Shown, take_column, write
 from damadics_fd.core.scada.monitor import ScadaMonitor
 from damadics_fd.core.scada.pressure import PRESSURE
 from damadics_fd.core.scada.settings import ScadaSettings
-from damadics_fd.core.scada.state import REFERENCE
+from damadics_fd.core.scada.state import MONITOR, REFERENCE
 from damadics_fd.core.settings import Settings
 
-
-def estimator_for(settings: Settings) -> Estimator:
-    """
-    Return the estimator of a mode.
-
-    :param settings: all settings.
-    :return: the approximator, or the SCADA-rate monitor in mode `scada`.
-    """
-    return ScadaEstimator(settings) if settings.mode == 'scada' else Estimator(settings)
+BLANK = np.zeros(1, MONITOR)
 
 
-class ScadaEstimator(Estimator):
+class ScadaEstimator(Intake):
     """
     Estimate the stem at 1 Hz from CV, P1, P2 and judge it by its tests.
 
@@ -54,13 +49,16 @@ class ScadaEstimator(Estimator):
             )
         )
         super().__init__(settings)
+        self.shown = Shown.rows()
+        self._estimate = Estimate.rows()
+        self.reset()
 
     def reset(self) -> None:
         """Forget everything: what was learned, the models and the counters."""
-        super().reset()
+        self.forget()
         self.monitor.forget()
-        self._ratio = self._residual = 0.0
-        self.state['phase'] = PHASE_INIT
+        self.shown[:] = Shown.rows()
+        self.shown['phase'] = PHASE_INIT
 
     def update(
         self,
@@ -72,54 +70,107 @@ class ScadaEstimator(Estimator):
         t1: float,
         flow: float,
         ps: float,
-    ) -> Estimate | None:
+    ) -> Estimate | Refused:
         """
         Take one measurement; `t1` and `flow` may be NaN, `ps` is not used.
 
-        :param stamp: these parameters are those of `Estimator.update`.
-        :return: the estimate; None where the sample was refused, see `last_rejection`.
+        :param stamp: sampling instant [ns]; the rest are the signals.
+        :return: the estimate, or why the sample was refused.
         """
         values = (cv, x1, p1, p2, t1, flow, ps)
-        q, c = self.quality[0], self._settings[0]
+        reason = np.empty(1, np.uint8)
+        signals = [np.array([value]) for value in values]
+        self.run(np.array([stamp]), signals, reason, self._estimate)
+        if reason[0] and self.refused:
+            return self.refused
+        return Estimate(*self._estimate.item())
+
+    def run(
+        self,
+        stamp: Ints,
+        signals: Sequence[Floats],
+        reason: NDArray[np.uint8],
+        estimates: Array,
+    ) -> None:
+        """
+        Take a column of measurements.
+
+        :param stamp: sampling instants [ns].
+        :param signals: contiguous columns in the order of SIGNALS.
+        :param reason: written: 0 or the reason of refusal.
+        :param estimates: rows of `Estimate`, written; those of refused samples stay as they are.
+        """
+        before = self.last_stamp
+        learned = 0
+        while learned < len(stamp) and self.monitor.reference is None:
+            values = [float(signal[learned]) for signal in signals]
+            row = estimates[learned : learned + 1]
+            reason[learned] = self._learn(int(stamp[learned]), values, row)
+            learned += 1
+        if learned < len(stamp) and self.monitor.reference is not None:
+            rest = slice(learned, None)
+            take_column(
+                self.quality,
+                self.shown,
+                self.monitor.states,
+                self._settings,
+                self.monitor.record,
+                self.monitor.reference,
+                BLANK,
+                reason[rest],
+                estimates[rest],
+                stamp[rest],
+                *(signal[rest] for signal in signals),
+            )
+        self.note_column(reason, stamp, signals, before)
+
+    def _learn(self, stamp: int, values: Sequence[float], row: Array) -> int:
+        """Take one sample while the valve is learned; return ACCEPTED or the reason."""
+        q, c, shown = self.quality[0], self._settings[0], self.shown[0]
         reason = quality.check_values(c, *values) or quality.check_stamp(q, c, stamp)
         restarted = not q.started
         quality.admit(q, c, stamp, reason)
         if reason:
-            self.last_rejection = self._explain(reason, stamp, values)
-            return None
+            return reason
         if restarted:
             self.monitor.resume()  # the first sample, or a clock set back
+        cv, x1, p1, p2, t1, flow, ps = values
         decision = self.monitor.update(stamp * 1e-9, cv, x1, p1, p2, t1, flow)
         if decision is not None:
             learning = self.monitor.reference is None
-            self._residual = 0.0 if math.isnan(decision.r1) else decision.r1
-            self._ratio = 0.0 if learning else decision.ratio
-            self.state['phase'] = (
-                PHASE_LEARN_PHI
-                if learning
-                else PHASE_MONITOR
-                if decision.monitoring
-                else PHASE_HOLD
-            )
-        x = x1 + self.settings.spring_origin
-        return Estimate(
-            stamp=stamp,
-            x2=math.nan,
-            x1_hat=x - self._residual,
-            x2_hat=math.nan,
-            xi1=self._residual,
-            xi2=math.copysign(self._ratio, self._residual),
-            phi=0.0,
-            alpha1=0.0,
-            alpha4=0.0,
-            alpha5=0.0,
-            x1=x1,
-            u=cv,
-            ps=ps,
-            dp=p1 - p2,
-            progress=self.monitor.progress,
-            phase=int(self.state[0].phase),
-        )
+            armed = PHASE_MONITOR if decision.monitoring else PHASE_HOLD
+            shown.residual = 0.0 if math.isnan(decision.r1) else decision.r1
+            shown.ratio = 0.0 if learning else decision.ratio
+            shown.phase = PHASE_LEARN_PHI if learning else armed
+        write(row[0], shown, c, stamp, cv, x1, p1, p2, ps, self.monitor.progress)
+        return reason
+
+    @property
+    def phase(self) -> str:
+        """
+        Return the phase of the last estimate.
+
+        :return: a name out of `modes.PHASES`.
+        """
+        return PHASES[int(self.shown['phase'][0])]
+
+    @property
+    def monitoring(self) -> bool:
+        """
+        Tell whether decisions count.
+
+        :return: True in the phase `monitor`.
+        """
+        return bool(self.shown['phase'][0] == PHASE_MONITOR)
+
+    @property
+    def progress(self) -> float:
+        """
+        Return the share of the learning that is done.
+
+        :return: 0..1.
+        """
+        return self.monitor.progress
 
     @property
     def status(self) -> str:
@@ -128,7 +179,7 @@ class ScadaEstimator(Estimator):
 
         :return: for people; never "monitoring" while it does not monitor.
         """
-        phase = self.state[0].phase
+        phase = self.shown['phase'][0]
         if phase == PHASE_MONITOR:
             isolation = self.monitor.isolate()
             return f'monitoring; alarm: {isolation.text()}' if isolation else 'monitoring'
@@ -140,7 +191,7 @@ class ScadaEstimator(Estimator):
         problem = self.monitor.learning_problem
         return f'{share}: insufficient excitation, {problem}' if problem else share
 
-    def learned(self) -> dict[str, Any]:
+    def learned(self) -> Saved:
         """
         Return what was learned, to be kept over a restart.
 
@@ -154,7 +205,7 @@ class ScadaEstimator(Estimator):
         flat |= {f'pressure_{name}': reference[0]['pressure'][name] for name in _FILTER}
         return {name: np.asarray(value).tolist() for name, value in flat.items()}
 
-    def restore(self, learned: Mapping[str, Any]) -> None:
+    def restore(self, learned: Mapping[str, Plain]) -> None:
         """
         Take up what `learned` returned and monitor as soon as the models have settled.
 
@@ -186,7 +237,7 @@ class ScadaEstimator(Estimator):
         :param after_repair: makes no difference here.
         """
         self.monitor.forget()
-        self.state['phase'] = PHASE_LEARN_PHI
+        self.shown['phase'] = PHASE_LEARN_PHI
 
 
 _PLAIN = tuple(name for name in REFERENCE.names or () if name != 'pressure')

@@ -211,6 +211,16 @@ class ScadaMonitor:
         return min(float(self.state.t - self.state.t_first) / self._learn_until, 1.0)
 
     @property
+    def states(self) -> NDArray:
+        """Return the array of length 1 that holds the record of the compiled step."""
+        return self._state
+
+    @property
+    def record(self) -> NDArray:
+        """Return the settings of the compiled step."""
+        return self._record
+
+    @property
     def state(self) -> Any:
         """Return the record of the compiled step."""
         return self._state[0]
