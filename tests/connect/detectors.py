@@ -70,6 +70,12 @@ class Detectors:
         """Stop repeating the flags, as detectors that have died."""
         self.flags = {}
 
+    def __enter__(self) -> 'Detectors':
+        return self
+
+    def __exit__(self, *problem: object) -> None:
+        self.close()
+
     def close(self) -> None:
         self._stop.set()
         self._thread.join(5.0)
