@@ -224,7 +224,7 @@ def test_all_mistakes_in_the_parameters_are_listed(domain, name):
     done = subprocess.run(
         [executable('damadics_fd', name), *wrong], capture_output=True, text=True, timeout=30
     )
-    assert done.returncode == 1
+    assert done.returncode == 2
     for cause in (
         'k1: -1.0 is not within',
         'tau: 0 is not a number with a decimal point',

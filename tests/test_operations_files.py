@@ -131,7 +131,7 @@ def test_the_parameter_file_is_taken_by_the_node(name, tmp_path):
     done = subprocess.run(
         [executable('damadics_fd', name), *wrong], capture_output=True, text=True, timeout=60
     )
-    assert done.returncode == 1
+    assert done.returncode == 2
     complaints = [line for line in done.stderr.splitlines() if line.startswith('  ')]
     assert complaints == ['  no_such: there is no such parameter']
 

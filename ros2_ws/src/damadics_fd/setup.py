@@ -29,10 +29,10 @@ setup(
     },
     entry_points={
         'console_scripts': [
-            'estimator = damadics_fd.nodes.estimator_node:main',
-            'detector = damadics_fd.nodes.detector_node:main',
-            'monitors = damadics_fd.nodes.monitors:main',
-            'recorder = damadics_fd.commands.record:main',
+            'estimator = damadics_fd.start:estimator',
+            'detector = damadics_fd.start:detector',
+            'monitors = damadics_fd.start:monitors',
+            'recorder = damadics_fd.start:recorder',
             'evaluate = damadics_fd.commands.evaluate:main',
             'replay = damadics_fd.commands.replay.replay:main',
             'verify = damadics_fd.commands.verify:main',

@@ -9,12 +9,17 @@ import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from ament_index_python.packages import get_package_share_directory
 from damadics_fd.ros.arguments import command_parser, state_folder
+from damadics_fd.start import missing_middleware
+from damadics_fd.store.access import AccessError
+from damadics_fd.store.slots import check_folder
 
 from damadics_bringup.fleet import MONITORS, FleetError, Valve, read_fleet, spread
+from damadics_bringup.keeper import USAGE, Keeper, Task
+from damadics_bringup.page_options import check_page, port
 from damadics_bringup.processes import ProcessError, Processes, assignments
 
 EXAMPLES = """examples:
@@ -24,18 +29,7 @@ EXAMPLES = """examples:
 LOOK = 0.2  # s between two looks at the processes
 END = {'recorder': 60.0, 'monitors': 60.0}  # s to write what it has, to take leave of DDS for many
 NAMED = 8  # valves whose names are printed
-FIRST_PAUSE, LONGEST_PAUSE = 1.0, 30.0  # s before a node that has died is started again
-STABLE = 60.0  # s after which a node counts as running
 FOREVER = 1e8  # s of simulated time
-
-
-class Task(NamedTuple):
-    """One process that is kept running."""
-
-    label: str
-    package: str
-    executable: str
-    arguments: list[str]
 
 
 def arguments_of(
@@ -111,6 +105,7 @@ def tasks_of(valves: list[Valve], options: argparse.Namespace) -> list[Task]:
                 'dashboard',
                 ['--port', str(options.port), '--host', options.host]
                 + (['--show'] if options.show else [])
+                + (['--token-file', str(options.token_file)] if options.token_file else [])
                 + arguments_of({}, enclave='/dashboard'),
             )
         )
@@ -177,52 +172,6 @@ def _together(valves: list[Valve], processes: int) -> list[Task]:
     ]
 
 
-class Keeper:
-    """
-    Starts tasks and starts them again when they die, after a pause that doubles.
-
-    :param processes: where they run.
-    :param tasks: what is kept running.
-    """
-
-    def __init__(self, processes: Processes, tasks: list[Task]) -> None:
-        self._processes = processes
-        self._tasks = {task.label: task for task in tasks}
-        self._started: dict[str, float] = {}
-        self._due: dict[str, float] = {}
-        self._pause = dict.fromkeys(self._tasks, FIRST_PAUSE)
-        for label in self._tasks:
-            self._start(label)
-
-    def look(self) -> None:
-        """Start again what has died."""
-        now = time.monotonic()
-        for label in self._tasks:
-            if label in self._due:
-                if now >= self._due[label]:
-                    del self._due[label]
-                    self._start(label)
-            elif (code := self._processes.exit_code(label)) is not None:
-                if now - self._started[label] > STABLE:
-                    self._pause[label] = FIRST_PAUSE
-                pause = self._pause[label]
-                self._pause[label] = min(2.0 * pause, LONGEST_PAUSE)
-                self._due[label] = now + pause
-                log = self._processes.log(label)
-                words = log.read_text(errors='replace').strip().splitlines()[-1:]
-                print(
-                    f'{label} ended with exit code {code}, again in {pause:g} s: '
-                    f'{words[0] if words else "no words"} ({log})',
-                    file=sys.stderr,
-                    flush=True,
-                )
-
-    def _start(self, label: str) -> None:
-        task = self._tasks[label]
-        self._processes.start(task.package, task.executable, task.arguments, label)
-        self._started[label] = time.monotonic()
-
-
 def parser() -> argparse.ArgumentParser:
     """
     Describe the command line.
@@ -242,7 +191,13 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument('--dashboard', action='store_true', help='start the web page')
     p.add_argument('--show', action='store_true', help='open the web page in a browser')
     p.add_argument('--host', default='127.0.0.1', help='address of the web page (127.0.0.1)')
-    p.add_argument('--port', type=int, default=8080, help='port of the web page (8080)')
+    p.add_argument('--port', type=port, default=8080, help='port of the web page (8080)')
+    p.add_argument(
+        '--token-file',
+        type=Path,
+        metavar='FILE',
+        help='tokens that other machines must show to the web page',
+    )
     p.add_argument('--record', type=Path, metavar='DIR', help='record all topics into this bag')
     p.add_argument(
         '--processes',
@@ -306,13 +261,18 @@ def main(args: Sequence[str] | None = None) -> int:
             raise FleetError(
                 '--processes: give a number of processes from 1, such as the cores of this machine'
             )
+        if options.dashboard:
+            check_page(options.host, options.port, options.token_file)
+        problem = missing_middleware() or (options.record and check_folder(options.record.parent))
+        if problem:
+            raise FleetError(problem)
         valves = read_fleet(options.fleet or share / 'config' / 'demo_valve.yaml')
         tasks = tasks_of(valves, options)
         with Processes(options.logs) as processes:
             keeper = Keeper(processes, tasks)
             print(greeting(valves, options), flush=True)
             end = time.monotonic() + (options.seconds or 1e9)
-            while not stop and time.monotonic() < end:
+            while not stop and time.monotonic() < end and not keeper.hopeless:
                 time.sleep(LOOK)
                 keeper.look()
             signals = len(stop)
@@ -320,10 +280,13 @@ def main(args: Sequence[str] | None = None) -> int:
             killed = processes.end_all(patient_with=patience, hurry=lambda: len(stop) > signals)
             if killed:
                 print(f'run: killed, as they did not end: {", ".join(killed)}', file=sys.stderr)
-    except (FleetError, ProcessError) as problem:
+    except (FleetError, AccessError) as problem:
+        print(f'run: {problem}', file=sys.stderr)
+        return USAGE
+    except (ProcessError, OSError) as problem:
         print(f'run: {problem}', file=sys.stderr)
         return 1
-    return 0
+    return USAGE if keeper.refused else 0
 
 
 if __name__ == '__main__':

@@ -2,20 +2,26 @@
 # SPDX-License-Identifier: Apache-2.0
 """Start the project's nodes as processes and end them again."""
 
+import ctypes
 import json
 import os
 import random
 import signal
 import socket
 import subprocess
+import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
 import yaml
 from ament_index_python.packages import PackageNotFoundError, get_package_prefix
+
+PR_SET_PDEATHSIG = 1  # prctl(2)
+_LIBC = ctypes.CDLL(None) if sys.platform == 'linux' else None
 
 
 class ProcessError(Exception):
@@ -108,9 +114,26 @@ def _is_plain(value: Any) -> bool:
         return False
 
 
+def end_with(parent: int) -> None:
+    """
+    Have the kernel end this process when the one that started it dies, killed or not.
+
+    Called in a new process before it runs its program; nothing here may allocate much.
+
+    :param parent: number of the process that starts it.
+    """
+    if _LIBC is not None:
+        _LIBC.prctl(PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0)
+        if os.getppid() != parent:  # it has died in between
+            os._exit(1)
+
+
 class Processes:
     """
     The processes of one run; leaving the context ends what still runs.
+
+    They also end when this process dies, whatever kills it; start them from its main thread, whose
+    end the kernel takes for that of the process.
 
     :param logs: folder for the output of each process.
     :param environment: variables added to this process's own.
@@ -188,6 +211,7 @@ class Processes:
                 stderr=subprocess.STDOUT,
                 env=self._environment,
                 start_new_session=True,  # Ctrl-C reaches it through this process, and once only
+                preexec_fn=partial(end_with, os.getpid()),
             )
 
     def log(self, name: str) -> Path:

@@ -10,9 +10,9 @@ from damadics_fd.core.stamps import SECOND, is_date
 LEAST_MAX_AGE = 2.0  # s
 PERIODS = 3.0  # sample periods; slower samples are that old by nature
 BACK = 1.0  # s that stamps may be out of order without being another run
-PAUSED = 30.0  # s of an even delay after which a source of simulated stamps has been paused
-EVEN = 0.5  # s
-INTERRUPTED = 1.0  # s without a sample
+INTERRUPTED = 0.5  # s without a sample, after which a source of simulated stamps may have paused
+WINDOW = 2.0  # s; two of them with the same delay after it say that it has
+EVEN = 0.1  # s
 JUMP = 60.0  # s that a stamp may run ahead of the time that has passed
 AGREEING = 3  # samples in a row that make a jump ahead credible
 
@@ -35,8 +35,8 @@ class Freshness:
 
     With simulated time the clock is that of /clock, for all stamps. Other stamps count from the
     start of a run: for them the age is what clock less stamp exceeds its smallest value since the
-    source was first heard by, so that a queue that grows shows. A source that was paused, which
-    then runs on with an even delay, is counted anew after half a minute.
+    source was first heard by, so that a queue that grows shows. Where samples stop for a while and
+    then run on with an even delay, which no queue has, the source was paused: the pause is no age.
 
     :param simulated: the clock is that of /clock.
     """
@@ -46,7 +46,11 @@ class Freshness:
         self._stamp: int | None = None
         self._steady = 0.0  # when it was heard [s]
         self._least = math.inf  # of steady time less stamp [s]
-        self._even = self._even_since = 0.0
+        self._delay = 0.0  # of the newest sample: steady time less stamp [s]
+        self._pause = 0.0  # what the last interruption may have been [s]
+        self._window = 0.0  # when the present window began [s]
+        self._lowest = math.inf  # delay in it [s]
+        self._before = math.inf  # delay in the one before [s]
 
     def heard(self, stamp: int, steady: float) -> None:
         """
@@ -58,14 +62,23 @@ class Freshness:
         before, self._stamp = self._stamp, stamp
         delay = steady - stamp / SECOND
         if before is None or stamp < before - BACK * SECOND or is_date(before) != is_date(stamp):
-            self._least, self._even, self._even_since = delay, delay, steady
-        elif delay < self._least:
             self._least = delay
-        if abs(delay - self._even) > EVEN or steady - self._steady > INTERRUPTED:
-            self._even, self._even_since = delay, steady
-        elif steady - self._even_since > PAUSED:
-            self._least = max(self._least, min(delay, self._even))
-        self._steady = steady
+            self._pause = 0.0
+        elif steady - self._steady > INTERRUPTED:
+            self._pause += max(delay - self._delay, 0.0)
+            self._begin_window(steady, math.inf)
+        self._least = min(self._least, delay)
+        self._delay, self._steady = delay, steady
+        if self._pause > 0.0:
+            self._lowest = min(self._lowest, delay)
+            if steady - self._window > WINDOW:
+                if abs(self._lowest - self._before) < EVEN:
+                    self._least += min(self._pause, self._lowest - self._least)
+                    self._pause = 0.0
+                self._begin_window(steady, self._lowest)
+
+    def _begin_window(self, steady: float, before: float) -> None:
+        self._window, self._before, self._lowest = steady, before, math.inf
 
     def age(self, clock: int, steady: float) -> float:
         """

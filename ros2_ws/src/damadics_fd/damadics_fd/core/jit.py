@@ -3,12 +3,16 @@
 """The one place that decides how a hot loop is compiled."""
 
 import hashlib
+import os
+import shutil
 from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
+
+from damadics_fd.core.private import instead_of, writable
 
 F = TypeVar('F', bound=Callable[..., Any])
 settings: Any = numba.config
@@ -26,7 +30,18 @@ def _cache(folder: Path) -> str:
     digest = hashlib.sha256()
     for source in sorted({*CORE.rglob('*.py'), *folder.rglob('*.py')}):
         digest.update(source.read_bytes())
-    return str(folder / '__pycache__' / f'numba-{digest.hexdigest()[:16]}')
+    kept = folder / '__pycache__' / f'numba-{digest.hexdigest()[:16]}'
+    return str(kept if writable(kept) else _private(kept))
+
+
+def _private(kept: Path) -> Path:
+    """Begin a cache of this user with what the installation has compiled."""
+    chosen = instead_of(CORE.parent, 'compiled code') / f'{kept.parent.parent.name}-{kept.name}'
+    if kept.is_dir() and not chosen.exists():
+        part = chosen.with_name(f'{chosen.name}.{os.getpid()}')
+        shutil.copytree(kept, part)
+        part.rename(chosen) if not chosen.exists() else shutil.rmtree(part)
+    return chosen
 
 
 def jit(function: F, inline: str = 'never') -> F:

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the monitoring nodes share: a lifecycle that starts by itself, parameters, diagnostics."""
 
+import sys
 from abc import ABC, abstractmethod
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from damadics_fd.nodes.input_watch import InputWatch
 from damadics_fd.ros import own_services
 from damadics_fd.ros.diagnostics import Diagnostics, Level, Report
 from damadics_fd.ros.entities import Entities
+from damadics_fd.ros.parameter_files import files_of, says_nothing
 from damadics_fd.ros.parameters import Parameters, declare_settings
 from damadics_fd.ros.spin import StartError
 from damadics_fd.store.slots import check_folder
@@ -74,6 +76,9 @@ class MonitoringNode(LifecycleNode, ABC):
         self.declare_more()
         self.settings: Settings = declare_settings(self.parameters)
         self.add_post_set_parameters_callback(self._apply)
+        for file in files_of(sys.argv if arguments is None else arguments):
+            if silent := says_nothing(file, self.get_fully_qualified_name()):
+                self.get_logger().warning(silent)
 
     def declare_more(self) -> None:
         """Declare the parameters of the node itself."""

@@ -9,6 +9,7 @@ from functools import partial
 from damadics_fd.nodes.detector_node import DetectorNode
 from damadics_fd.nodes.estimator_node import EstimatorNode
 from damadics_fd.ros.arguments import command_parser
+from damadics_fd.ros.parameter_files import missing_file
 from damadics_fd.ros.spin import SpinnableNode, spin_all
 
 NODES: dict[str, Callable[[list[str]], SpinnableNode]] = {
@@ -70,6 +71,9 @@ def main(args: list[str] | None = None) -> int:
             f'there is no node {unknown[0]}; there are {", ".join(NODES)}, with '
             f'"{SEPARATOR}" between two of them'
         )
+    problem = missing_file(words)
+    if problem:
+        p.error(problem)
     # The process takes its enclave and log level from all words, the nodes theirs from their own.
     return spin_all([partial(NODES[name], own) for name, *own in groups], words)
 

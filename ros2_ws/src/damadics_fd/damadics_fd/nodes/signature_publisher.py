@@ -18,7 +18,7 @@ from damadics_fd.core.signature.signature import Signature
 from damadics_fd.core.stamps import another_run
 from damadics_fd.ros import qos
 from damadics_fd.ros.entities import Entities
-from damadics_fd.ros.spin import StartError
+from damadics_fd.ros.spin import UsageError
 from damadics_fd.store.file_names import file_name
 from damadics_fd.store.references import (
     NoReferenceError,
@@ -37,12 +37,12 @@ def read_causes(path: str) -> CauseTable:
 
     :param path: file of the user; empty for the table of the package.
     :return: the table.
-    :raises StartError: naming everything that is wrong in it.
+    :raises UsageError: naming everything that is wrong in it.
     """
     try:
         return load_causes(Path(path) if path else None)
     except (CauseTableError, OSError) as error:
-        raise StartError(f'causes_file: {error}') from error
+        raise UsageError(f'causes_file: {error}') from error
 
 
 class SignaturePublisher:

@@ -8,6 +8,9 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from damadics_fd.core.private import instead_of, writable
+from damadics_fd.ros.parameter_files import missing_file
+
 NODE_HELP = """
 
 while it runs, its parameters:
@@ -21,8 +24,14 @@ def state_folder() -> Path:
 
     :return: a folder of the user, by the XDG base directory specification.
     """
-    base = os.environ.get('XDG_STATE_HOME') or Path.home() / '.local' / 'state'
-    return Path(base, 'damadics_fd')
+    base = os.environ.get('XDG_STATE_HOME')
+    try:
+        folder = Path(base or Path.home() / '.local' / 'state', 'damadics_fd')
+    except RuntimeError:  # a user without a home
+        folder = Path('/nonexistent', 'damadics_fd')
+    if base or writable(folder):
+        return folder
+    return instead_of(folder, 'alarms, references and logs') / 'state'
 
 
 def command_parser(name: str, description: str, examples: str) -> argparse.ArgumentParser:
@@ -59,7 +68,11 @@ def check_node_arguments(
     """
     p = command_parser(name, description, examples + NODE_HELP.format(node=name))
     p.usage = f'{name} [-h] [--ros-args -p NAME:=VALUE --params-file FILE -r __ns:=/NAMESPACE ...]'
-    p.parse_args(split_ros_args(args)[0])
+    own, ros_args = split_ros_args(args)
+    p.parse_args(own)
+    problem = missing_file(ros_args)
+    if problem:
+        p.error(problem)
 
 
 def split_ros_args(args: Sequence[str] | None) -> tuple[list[str], list[str]]:

@@ -12,7 +12,7 @@ from rclpy.node import Node
 
 from damadics_fd.core.modes import MODES
 from damadics_fd.core.settings import Settings, SettingsError, unread
-from damadics_fd.ros.spin import StartError
+from damadics_fd.ros.spin import UsageError
 
 DEFAULT_MODE = 'monitor'
 OF_EVERY_NODE = ('use_sim_time', 'start_type_description_service', 'qos_overrides.')
@@ -90,7 +90,7 @@ class Parameters:
         Refuse the parameters if anything is wrong with them; call it after the last declaration.
 
         :param more: further mistakes that the node has found.
-        :raises StartError: listing every mistake, a line each.
+        :raises UsageError: listing every mistake, a line each.
         """
         for name in self._given():
             if name in self._names or name.startswith(OF_EVERY_NODE):
@@ -101,7 +101,7 @@ class Parameters:
         problems = [*self._problems, *more]
         if problems:
             name = self._node.get_name()
-            raise StartError('\n  '.join([f'{name} does not start, its parameters:', *problems]))
+            raise UsageError('\n  '.join([f'{name} does not start, its parameters:', *problems]))
 
     def refuse(self, name: str, text: str) -> None:
         """
@@ -128,7 +128,7 @@ def declare_settings(parameters: Parameters) -> Settings:
 
     :param parameters: of the node, with its other parameters declared.
     :return: the settings.
-    :raises StartError: listing every mistake in the node's parameters.
+    :raises UsageError: listing every mistake in the node's parameters.
     """
     mode = parameters.declare('mode', DEFAULT_MODE, 'how the approximator is run', allowed=MODES)
     values = {}

@@ -11,13 +11,17 @@ from typing import Any, Protocol
 
 import rclpy
 from rclpy.clock import Clock, ClockType
+from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.executors import ExternalShutdownException
 from rclpy.experimental import EventsExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation as rcl
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
+from damadics_fd.core.text import SENTENCE, plain
 from damadics_fd.ros.clock_step import timers_kept_going
 
+WRONG = (NameValidationException, ParameterException)
 LOOK = 0.1  # s between two looks at whether to end
 LONG = 3600.0  # s; a call costs 30 bytes that rclpy never frees
 
@@ -34,6 +38,14 @@ class SpinnableNode(Protocol):
 
 class StartError(Exception):
     """A node refuses to start; the message names every cause and its remedy."""
+
+    exit_code = 1
+
+
+class UsageError(StartError):
+    """What a node was given is wrong: it would be as wrong after a restart."""
+
+    exit_code = 2
 
 
 def spin_until(done: Callable[[], bool], executor: EventsExecutor, nodes: Sequence[Any]) -> None:
@@ -114,7 +126,10 @@ def spin_all(makers: Sequence[Callable[[], SpinnableNode]], args: list[str] | No
                 node.destroy_node()
     except StartError as problem:
         print(problem, file=sys.stderr)
-        return 1
+        return problem.exit_code
+    except (rcl.RCLError, rcl.UnknownROSArgsError, *WRONG) as problem:
+        print(f'wrong arguments: {plain(str(problem), SENTENCE)}', file=sys.stderr)
+        return UsageError.exit_code
     except KeyboardInterrupt:
         return 0
     finally:

@@ -4,6 +4,7 @@
 
 import math
 
+import numpy as np
 import pytest
 from damadics_fd.core.freshness import ForwardJumps, Freshness, default_max_age
 
@@ -57,13 +58,24 @@ def test_a_queue_that_grows_all_the_time_shows():
     assert fresh.age(0, 20_000 / 190) == pytest.approx(20_000 / 190 - 20_000 / 200, abs=0.1)
 
 
+def test_a_queue_that_grows_slowly_shows_too():
+    fresh = Freshness()
+    for n in range(60_000):
+        fresh.heard(n * PERIOD, n / 198)
+    assert fresh.age(0, 60_000 / 198) == pytest.approx(60_000 / 198 - 60_000 / 200, abs=0.1)
+
+
 def test_a_source_that_was_paused_is_fresh_again_after_a_while():
+    rng = np.random.default_rng(0)
     fresh = Freshness()
     for n in range(200):
         fresh.heard(n * PERIOD, n / 200)
-    for n in range(200, 10_000):
-        fresh.heard(n * PERIOD, 10.0 + n / 200)
-    assert fresh.age(0, 10.0 + 50.0) == pytest.approx(0.0, abs=0.6)
+    for n in range(200, 1200):
+        now = 10.0 + n / 200 + rng.exponential(0.05)
+        fresh.heard(n * PERIOD, now)
+        if n < 900:
+            assert fresh.age(0, now) > 9.0, 'not before it is certain'
+    assert fresh.age(0, 10.0 + 6.0) == pytest.approx(0.0, abs=0.3)
 
 
 def test_another_run_begins_anew():

@@ -1,0 +1,76 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Where the executables begin: before the imports that take seconds and may fail."""
+
+import os
+import sys
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+
+INTERRUPTED = 130
+
+
+def run(module: str) -> int:
+    """
+    Run the `main` of a module.
+
+    :param module: its name.
+    :return: its exit code; 130 where Ctrl-C comes while it is imported, 2 where the middleware
+        that the environment asks for is not installed.
+    """
+    try:
+        problem = missing_middleware()
+        if problem:
+            print(problem, file=sys.stderr)
+            return 2
+        main: Callable[[], int] = import_module(module).main
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    return main()
+
+
+def missing_middleware() -> str:
+    """
+    Tell that another middleware is asked for than is installed; rcl would end with code 102.
+
+    :return: one sentence with the remedy, '' where all is well.
+    """
+    wanted = os.environ.get('RMW_IMPLEMENTATION', '')
+    index = Path('share', 'ament_index', 'resource_index', 'rmw_typesupport')
+    folders = os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)
+    installed = sorted(
+        {
+            file.name
+            for folder in folders
+            if folder and (Path(folder) / index).is_dir()
+            for file in (Path(folder) / index).iterdir()
+            if file.name != 'rmw_implementation'
+        }
+    )
+    if not wanted or not installed or wanted in installed:
+        return ''
+    return (
+        f'RMW_IMPLEMENTATION={wanted}, but this middleware is not installed; there is '
+        f'{", ".join(installed)}: unset RMW_IMPLEMENTATION, or install ROS 2 with it'
+    )
+
+
+def estimator() -> int:
+    """Run the node `estimator`."""
+    return run('damadics_fd.nodes.estimator_node')
+
+
+def detector() -> int:
+    """Run the node `detector`."""
+    return run('damadics_fd.nodes.detector_node')
+
+
+def monitors() -> int:
+    """Run the nodes of many valves."""
+    return run('damadics_fd.nodes.monitors')
+
+
+def recorder() -> int:
+    """Run the recorder."""
+    return run('damadics_fd.commands.record')
