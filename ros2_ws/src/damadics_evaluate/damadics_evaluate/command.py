@@ -12,6 +12,7 @@ from damadics_evaluate.benchmark.campaign import Campaign
 from damadics_evaluate.benchmark.runner import admit, read_results, run_campaign
 from damadics_evaluate.benchmark.tables import compare, write_csv
 from damadics_evaluate.lublin import command as lublin
+from damadics_evaluate.recordings import command as recordings
 from damadics_evaluate.scenarios.cases import SCENARIOS
 from damadics_evaluate.scenarios.trajectories import CACHE_VARIABLE
 
@@ -110,6 +111,7 @@ def _parser() -> argparse.ArgumentParser:
     versus.add_argument('b', type=Path)
     versus.add_argument('--csv', type=Path, help='write all rows here')
     lublin.add_parser(commands)
+    recordings.add_parser(commands)
     check = commands.add_parser('check', help='test a detector: finite, repeatable, causal')
     check.add_argument('detectors', nargs='+', metavar='my.py:Class')
     return parser
@@ -130,6 +132,7 @@ def main(argv: list[str] | None = None) -> int:
             'compare': _compare,
             'paper': _paper,
             'lublin': lublin.lublin,
+            'recordings': recordings.recordings,
             'check': _check,
         }
         return commands[arguments.command](arguments) or 0

@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from damadics_evaluate import main
+from damadics_evaluate.alarms import Alarm, alarms_of
 from damadics_evaluate.lublin.files import date_of, read_folder
-from damadics_evaluate.lublin.judge import Alarm, alarms_of, false_alarms, outcomes
+from damadics_evaluate.lublin.judge import false_alarms, outcomes
 from damadics_evaluate.lublin.schedule import SCHEDULE, Induced, events_of
 
 SHARED = Path(__file__).resolve().parents[5] / 'shared' / 'data'
@@ -126,7 +127,7 @@ def test_the_user_states_the_stretch_to_learn_from(tmp_path, capsys):
     assert main(['lublin', str(folder), '--learn', '9-8']) == 1
     assert '--learn 9-8: give' in capsys.readouterr().err
     assert main(['lublin', str(folder), '--detectors', 'fixed', '--learn', '1000-2000']) == 0
-    assert 'state a fault-free stretch' in capsys.readouterr().out
+    assert 'state another: --learn START-END' in capsys.readouterr().out
 
 
 def test_missing_values_and_repeated_rows_do_no_harm(tmp_path):

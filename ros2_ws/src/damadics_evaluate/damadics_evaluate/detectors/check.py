@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from damadics_evaluate.columns import Floats
-from damadics_evaluate.detectors.base import Detector, F, MissingPackageError
+from damadics_evaluate.detectors.base import CV, Detector, F, MissingPackageError, X
 from damadics_evaluate.detectors.own import RefusedError
 from damadics_evaluate.loading import told
 
@@ -65,15 +65,35 @@ def _problems(kind: type[Detector], hour: Floats, run: Floats, strict: bool) -> 
     again.fit(hour.copy())
     if not _same(first, _judged(again, run.copy())):
         yield f'{kind.name} is not the same twice: give its random numbers a seed'
-    for share in CUTS:
-        n = int(share * len(run))
-        if not _same(first[:n], _judged(detector, run[:n].copy())):
-            yield f'{kind.name} looks ahead: without the samples after {n} it judges otherwise'
-            break
+    ahead = looks_ahead(detector, run, first)
+    if ahead:
+        yield ahead
     if strict:
         blind = run.copy()
         blind[:, F] = np.nan
         yield from _shape(f'{kind.name}, flow not measured,', _judged(detector, blind), run)
+
+
+def looks_ahead(detector: Detector, run: Floats, judged: Floats) -> str:
+    """
+    Run a fitted detector again with the end cut off, and with another end.
+
+    :param detector: fitted.
+    :param run: rows.
+    :param judged: its statistic on them.
+    :return: what it does, empty where its past does not depend on the future.
+    """
+    for share in CUTS:
+        n = int(share * len(run))
+        if not _same(judged[:n], _judged(detector, run[:n].copy())):
+            return (
+                f'{detector.name} looks ahead: without the samples after {n} it judges otherwise'
+            )
+        other = run.copy()
+        other[n:, CV], other[n:, X] = 0.0, 1.0  # larger than anything that a run shows
+        if not _same(judged[:n], _judged(detector, other)[:n]):
+            return f'{detector.name} looks ahead: other samples after {n} change its past'
+    return ''
 
 
 def _judged(detector: Detector, rows: Floats) -> Floats:

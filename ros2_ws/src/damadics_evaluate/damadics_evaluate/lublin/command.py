@@ -9,10 +9,11 @@ from datetime import date
 from pathlib import Path
 
 from damadics_evaluate.baselines import DETECTORS
-from damadics_evaluate.lublin.evaluation import evaluate
+from damadics_evaluate.detectors.find import find_detector
+from damadics_evaluate.lublin.evaluation import Learned, evaluate
 from damadics_evaluate.lublin.files import read_folder
-from damadics_evaluate.lublin.table import as_text, write_csv
-from damadics_evaluate.lublin.watchers import UNFIT, Learned
+from damadics_evaluate.lublin.table import as_text, write_csv, write_json
+from damadics_evaluate.watching import UNFIT
 
 EXAMPLES = """\
 examples:
@@ -41,7 +42,7 @@ def add_parser(commands: 'argparse._SubParsersAction[argparse.ArgumentParser]') 
         nargs='+',
         default=[name for name in DETECTORS if name not in UNFIT],
         metavar='NAME',
-        help=f'{", ".join(DETECTORS)} (all but {", ".join(UNFIT)})',
+        help=f'{", ".join(DETECTORS)}, my.py:Class (all built-in but {", ".join(UNFIT)})',
     )
     parser.add_argument(
         '--learn',
@@ -49,6 +50,9 @@ def add_parser(commands: 'argparse._SubParsersAction[argparse.ArgumentParser]') 
         default=[],
         metavar='[DATE:]START-END',
         help='fault-free stretch in seconds of the day; may be given once per day',
+    )
+    parser.add_argument(
+        '--campaign', type=Path, metavar='DIRECTORY', help='put the table into its report, too'
     )
     parser.add_argument('--csv', type=Path, metavar='FILE', help='write all outcomes here, too')
 
@@ -76,6 +80,8 @@ def lublin(arguments: argparse.Namespace) -> None:
     :param arguments: of the parser.
     """
     learn = dict(stretch_of(text) for text in arguments.learn)
+    for name in arguments.detectors:
+        find_detector(name)
 
     def tell(text: str) -> None:
         print(f'evaluate lublin: {text}', file=sys.stderr)
@@ -83,6 +89,9 @@ def lublin(arguments: argparse.Namespace) -> None:
     record = read_folder(arguments.folder, tell)
     table = evaluate(record, arguments.detectors, learn, tell)
     print(as_text(table))
+    if arguments.campaign:
+        arguments.campaign.mkdir(parents=True, exist_ok=True)
+        write_json(table, arguments.campaign / 'lublin.json')
     if arguments.csv:
         write_csv(table, arguments.csv)
         print(arguments.csv)

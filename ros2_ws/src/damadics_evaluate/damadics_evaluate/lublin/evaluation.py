@@ -2,13 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Every detector on every recorded day and actuator."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import date
 
-from damadics_evaluate.columns import NANOSECONDS, Columns
+from damadics_evaluate.alarms import Alarm
+from damadics_evaluate.columns import NANOSECONDS, Columns, cut
 from damadics_evaluate.lublin.files import ACTUATORS, Record
-from damadics_evaluate.lublin.judge import Alarm, Outcome, false_alarms, outcomes
+from damadics_evaluate.lublin.judge import Outcome, false_alarms, outcomes
 from damadics_evaluate.lublin.schedule import (
     DAYS,
     LEARN_S,
@@ -17,7 +19,20 @@ from damadics_evaluate.lublin.schedule import (
     events_of,
     first_event,
 )
-from damadics_evaluate.lublin.watchers import Learned, watch
+from damadics_evaluate.watching import watch
+
+
+@dataclass(frozen=True)
+class Learned:
+    """
+    The fault-free stretch a detector learns from.
+
+    :param start: first second of the day.
+    :param end: last second; alarms count from here on.
+    """
+
+    start: float
+    end: float
 
 
 @dataclass(frozen=True)
@@ -93,7 +108,7 @@ def evaluate(
         for name in detectors:
             progress(f'{day} actuator {actuator}: {name}')
             try:
-                alarms = watch(name, columns, stretch)
+                alarms = _alarms(name, columns, stretch)
             except (ValueError, ArithmeticError, LookupError, TypeError) as error:
                 table.refused.append(f'{name} on {day}, actuator {actuator}: {error}')
                 continue
@@ -103,6 +118,17 @@ def evaluate(
             hours = float((columns['stamp'] > stretch.end * NANOSECONDS).sum()) / 3600.0
             table.quiet.append(Quiet(day, actuator, name, tuple(wrong), hours))
     return table
+
+
+def _alarms(name: str, columns: Columns, stretch: Learned) -> list[Alarm]:
+    """Return the alarms of one detector after the stretch; what lies before is left out."""
+    record = cut(columns, stretch.start, math.inf)
+    learning = cut(record, stretch.start, stretch.end - 0.5)
+    try:
+        return watch(name, learning, record, stretch.end)
+    except ValueError as error:
+        where = f'learned on {stretch.start:.0f}-{stretch.end:.0f} s'
+        raise ValueError(f'{error} ({where}; state another: --learn START-END)') from error
 
 
 def default_stretch(columns: Columns, day: date) -> Learned:

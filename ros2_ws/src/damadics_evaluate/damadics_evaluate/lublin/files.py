@@ -9,38 +9,11 @@ from pathlib import Path
 
 import numpy as np
 from damadics_fd.bag.errors import BagError
-from damadics_fd.bag.tables import LUBLIN, Table
+from damadics_fd.bag.tables import LUBLIN, TAGS, Table, tag_matches
 
 from damadics_evaluate.columns import NANOSECONDS, Columns
 
-ACTUATORS = (1, 2, 3)
-KPA, PERCENT, TONNES = 1e3, 1e-2, 1 / 3.6  # to SI; m3/h as if the medium were water
-TAGS: dict[int, dict[str, tuple[str, float]]] = {
-    1: {
-        'p1': ('p51_05', KPA),
-        'p2': ('p51_06', KPA),
-        't1': ('t51_01', 1.0),
-        'flow': ('f51_01', TONNES),
-        'cv': ('lc51_03cv', PERCENT),
-        'x1': ('lc51_03x', PERCENT),
-    },
-    2: {
-        'p1': ('p57_03', KPA),
-        'p2': ('p57_04', KPA),
-        't1': ('t57_03', 1.0),
-        'flow': ('fc57_03pv', TONNES),
-        'cv': ('fc57_03cv', PERCENT),
-        'x1': ('fc57_03x', PERCENT),
-    },
-    3: {
-        'p1': ('p74_00', KPA),
-        'p2': ('p74_01', KPA),
-        't1': ('t74_00', 1.0),
-        'flow': ('f74_00', TONNES),
-        'cv': ('lc74_20cv', PERCENT),
-        'x1': ('l?c?74_20x', PERCENT),  # some sheets write L74_20X
-    },
-}
+ACTUATORS = tuple(TAGS)
 TIMES = ('t', 't_s', 'time', 'time_s', 'second', 'seconds')
 SUFFIXES = ('.txt', '.csv', '.tsv', '.dat')
 DAY_S = 86400.0
@@ -144,8 +117,8 @@ def _use(names: list[str], tags: Mapping[str, tuple[str, float]]) -> dict[str, t
     for i, name in enumerate(names):
         if name in TIMES:
             use['stamp'] = i, NANOSECONDS
-        for signal, (tag, factor) in tags.items():
-            if re.fullmatch(rf'{tag}(_.*)?', name):
+        for tag, (signal, factor) in tags.items():
+            if tag_matches(tag, name):
                 use.setdefault(signal, (i, factor))
     return use
 

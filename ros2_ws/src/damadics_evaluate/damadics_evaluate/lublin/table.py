@@ -3,6 +3,7 @@
 """The table event x detector as text, CSV and rows for a report."""
 
 import csv
+import json
 import math
 from datetime import date
 from pathlib import Path
@@ -109,7 +110,17 @@ def as_text(table: Evaluation) -> str:
         '  '.join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip()
         for row in grid
     ]
-    lines += ['', RULES, '']
+    return '\n'.join([*lines, '', RULES, '', *notes(table)])
+
+
+def notes(table: Evaluation) -> list[str]:
+    """
+    Return what the grid has no room for, one line each.
+
+    :param table: of `evaluate`.
+    :return: stretches learned on, false alarms, events not told apart, refusals, absent events.
+    """
+    lines = []
     for (day, actuator), s in sorted(table.learned.items()):
         lines.append(f'learned on {day} A{actuator}: {s.start:.0f}-{s.end:.0f} s')
     for quiet in table.quiet:
@@ -130,7 +141,18 @@ def as_text(table: Evaluation) -> str:
             f'{e.item} (A{e.actuator} {e.fault} {e.day} {e.start:.0f})' for e in table.absent
         )
         lines.append(f'absent from these files, {len(table.absent)} of 19: {names}')
-    return '\n'.join(lines)
+    return lines
+
+
+def write_json(table: Evaluation, file: Path) -> None:
+    """
+    Write the table for the report of a campaign.
+
+    :param table: of `evaluate`.
+    :param file: lublin.json in the campaign's directory.
+    """
+    content = {'rules': RULES, 'grid': rows(table), 'notes': notes(table)}
+    file.write_text(json.dumps(content), encoding='utf-8')
 
 
 def write_csv(table: Evaluation, file: Path) -> None:

@@ -4,6 +4,7 @@
 
 import io
 import math
+import re
 from collections.abc import Sequence
 from typing import Any
 
@@ -19,8 +20,9 @@ from damadics_evaluate.benchmark.tables import (
     unobservable,
 )
 from damadics_evaluate.detectors.find import title_of
-from damadics_evaluate.scenarios.cases import SCENARIOS
+from damadics_evaluate.scenarios.cases import SCENARIOS, case
 
+STEPS = 80  # of a delay curve; more would not be seen
 STRENGTHS = {'S': 0.25, 'M': 0.5, 'B': 0.75}
 OTHERS = ('#e07b00', '#2e8b57', '#8a4fa8', '#c8102e', '#5a6068', '#00838f', '#b58900', '#6b8e23')
 
@@ -28,6 +30,7 @@ OTHERS = ('#e07b00', '#2e8b57', '#8a4fa8', '#c8102e', '#5a6068', '#00838f', '#b5
 def _draw(size: tuple[float, float], draw: Any) -> str:
     """Return what `draw(axis)` makes of an empty axis, as SVG."""
     try:
+        from markupsafe import Markup
         from matplotlib import rc_context
         from matplotlib.figure import Figure
     except ImportError as error:
@@ -38,7 +41,22 @@ def _draw(size: tuple[float, float], draw: Any) -> str:
         stream = io.StringIO()
         figure.savefig(stream, format='svg', metadata={'Date': None})
     text = stream.getvalue()
-    return text[text.index('<svg') :]
+    return Markup(shrunk(text[text.index('<svg') :]))
+
+
+def shrunk(svg: str) -> str:
+    """
+    Return an SVG whose coordinates have two digits after the point.
+
+    >>> shrunk('<path d="M 1.23456 7.000001"/>')
+    '<path d="M 1.23 7"/>'
+    """
+
+    def short(match: re.Match[str]) -> str:
+        return f'{float(match[0]):.2f}'.rstrip('0').rstrip('.')
+
+    svg = re.sub(r'\d+\.\d{3,}', short, svg)
+    return re.sub(r'\n\s*', '\n', svg)
 
 
 def _colours(names: Sequence[str]) -> dict[str, tuple[str, float, str]]:
@@ -66,9 +84,11 @@ def delay_curves(results: Sequence[Result], detectors: Sequence[str]) -> str:
                 continue
             share = np.arange(1, len(values) + 1) / len(values)
             x = [max(t, 0.7) for t in values if math.isfinite(t)]
+            kept = np.unique(np.linspace(0, len(x) - 1, STEPS).astype(int)) if x else []
+            x, share = [x[i] for i in kept], share[list(kept)]
             axis.step(
                 [0.5, *x, 1e5],
-                [0.0, *share[: len(x)], share[len(x) - 1] if x else 0.0],
+                [0.0, *share, share[-1] if x else 0.0],
                 where='post',
                 color=colour,
                 lw=width,
@@ -119,16 +139,23 @@ def operating_curves(results: Sequence[Result], limits: dict[str, float], first_
     return _draw((9.0, 4.6), draw)
 
 
+def _strength(scenario: str) -> float | None:
+    """Return the strength of an abrupt fault of the benchmark, None for other scenarios."""
+    free = re.fullmatch(r'f\d+@(-?[\d.]+)', scenario)
+    if free:
+        return abs(float(free[1]))
+    return STRENGTHS.get(scenario[-1]) if scenario in SCENARIOS else None
+
+
 def detectability(results: Sequence[Result], detector: str = 'scada') -> str:
     """Return the delay over the strength of abrupt faults, one curve per fault."""
     points: dict[int, list[tuple[float, float]]] = {}
     for (scenario, name), group in scenario_results(results).items():
-        fault, _, rest = scenario.partition('@') if '@' in scenario else scenario.partition('_')
-        if name != detector or rest == 'I':
+        strength = _strength(scenario)
+        if name != detector or strength is None:
             continue
-        strength = abs(float(rest)) if '@' in scenario else STRENGTHS[rest]
         found = sorted(delays(group))
-        points.setdefault(int(fault[1:]), []).append((strength, found[len(found) // 2]))
+        points.setdefault(case(scenario).fault, []).append((strength, found[len(found) // 2]))
 
     def draw(_: Any, axis: Any) -> None:
         missed = 1400.0

@@ -32,7 +32,7 @@ _SCALED = {  # outputs of the benchmark's library, shares of their ranges
     'T1_norm': ('t1', 200.0),
     'F_norm': ('flow', 40 * TPH),
 }
-_TAGS = {  # of the three actuators of the sugar factory
+TAGS = {  # of the three actuators of the sugar factory: signal and factor to SI
     1: {
         'P51_05': ('p1', KPA),
         'P51_06': ('p2', KPA),
@@ -228,15 +228,25 @@ def _actuators(
     if {'cv', 'x1'} <= own.keys():
         return {'': own}
     tagged = {}
-    for number, tags in _TAGS.items():
+    for number, tags in TAGS.items():
         columns = dict(own)
         for i, name in enumerate(names):
-            tag = next((tag for tag in tags if re.match(rf'{tag}(_|$)', name)), None)
+            tag = next((tag for tag in tags if tag_matches(tag, name)), None)
             if tag:
                 columns[tags[tag][0]] = i, tags[tag][1]
         if actuator in (None, number) and len(columns) > len(own):
             tagged[f'A{number}'] = columns
     return tagged
+
+
+def tag_matches(tag: str, name: str) -> bool:
+    """
+    Tell whether a column bears a tag of the plant, in any case, with or without an addition.
+
+    >>> tag_matches('P51_05', 'p51_05_P1_kPa'), tag_matches('P51_05', 'P51_051')
+    (True, False)
+    """
+    return re.match(rf'{tag}(_|$)', name, re.IGNORECASE) is not None
 
 
 def _midnight(path: Path) -> int:
