@@ -11,6 +11,7 @@ import pytest
 import rclpy
 from damadics_bringup.processes import Processes, free_domain, parameters, surroundings
 from damadics_fd.bag import read_columns, write_columns
+from damadics_fd.commands.replay.live import Player
 from damadics_fd.commands.replay.replay import main as replay
 from damadics_fd.core.decision.alarm import RAISED
 from damadics_fd.core.monitor import run
@@ -74,6 +75,39 @@ def test_live_and_offline_agree_bit_for_bit(tmp_path, mode, source, speeds, chan
         assert replay([str(bag), '--mode', mode, '--out', str(out), *settings]) == 0
         (again,) = json.loads(out.read_text())
         assert [d['stamp'] for d in again['detections']] == rises
+
+
+def test_live_replay_publishes_signature_and_events_as_the_nodes_do(tmp_path):
+    columns = excerpt('lugre_spring', 52.0, 72.0)
+    source = tmp_path / 'source.mcap'
+    write_columns(source, columns, frame_id='LV-101')
+    own = {**surroundings(free_domain()), 'XDG_STATE_HOME': str(tmp_path / 'state')}
+    with Processes(tmp_path / 'logs', own) as processes:
+        processes.start('damadics_fd', 'recorder', ['--out', str(tmp_path / 'bag')])
+        settings = [f'--set={key}={value}' for key, value in QUICK.items()]
+        processes.start('damadics_fd', 'replay', [str(source), '--live', '--rate', '4', *settings])
+        wait_for_end(processes, 'replay')
+        processes.check()
+        processes.end('recorder')
+    bag = tmp_path / 'bag'
+    expected = run(columns, Settings.for_mode('monitor', **QUICK))
+    assert raised(read_columns(bag, '/fault_event')) == [e.stamp for e in expected.detections]
+    signature = read_columns(bag, '/signature')
+    assert len(signature['stamp']) >= 19, 'one a second of the recording'
+    for topic in ('/measurement', '/estimate', '/fault_flag', '/fault_event', '/signature'):
+        tags = read_columns(bag, topic, ['frame_id'])['frame_id']
+        assert set(tags.tolist()) == {'LV-101'}, topic
+
+
+def test_live_replay_leaves_the_clock_of_its_node_alone():
+    context = Context()
+    rclpy.init(context=context, domain_id=free_domain())
+    try:
+        player = Player(1.0, None, 'LV-101', context=context)
+        assert player.get_clock().now().nanoseconds > 0
+        player.destroy_node()
+    finally:
+        context.try_shutdown()
 
 
 def raised(events: dict[str, np.ndarray]) -> list[int]:

@@ -5,7 +5,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from numpy.typing import NDArray
+from damadics_fd.core.record import Floats, Ints
 
 OK, LIMITED, REFUSED = 'ok', 'limited', 'refused'
 VERDICTS = (OK, LIMITED, REFUSED)
@@ -28,4 +28,4 @@ class FaultFree:
     """Hold one fault-free recording as `commission` hands it to `identify` of a mode."""
 
     name: str
-    columns: Mapping[str, NDArray]  # `stamp` [ns] and the signals by name, NaN: not measured
+    columns: Mapping[str, Floats | Ints]  # `stamp` [ns] and the signals by name, NaN: not measured

@@ -30,6 +30,7 @@ import reprlib
 from collections.abc import Iterable, Mapping
 from typing import (
     Annotated,
+    Any,
     Protocol,
     Self,
     TypeAlias,
@@ -53,6 +54,19 @@ KINDS: dict[object, str] = {int: 'i8', float: 'f8', bool: '?'}
 SUITS = {'f': 'fiu', 'i': 'iu', 'b': 'b'}  # kinds of plain numbers that a kind of field takes
 
 
+def _field_first(row: np.record, name: str) -> Any:
+    """Return a field, else what numpy knows by the name."""
+    fields = np.void.__getattribute__(row, 'dtype').fields or {}
+    if name not in fields:
+        return np.record.__getattribute__(row, name)
+    value = row[name]
+    return value.view((Row, value.dtype)) if value.dtype.names and not value.ndim else value
+
+
+# a row whose fields hide numpy's own attributes: a field may be called `base` or `mean`
+Row = type('Row', (np.record,), {'__getattribute__': _field_first, '__module__': __name__})
+
+
 class Rows(Protocol[R]):
     """What a compiled function sees of a structured array: rows that are records."""
 
@@ -61,6 +75,22 @@ class Rows(Protocol[R]):
 
     def __len__(self) -> int:
         """Return the number of rows."""
+
+
+def stacked(parts: Iterable[Array]) -> Array:
+    """
+    Return the rows of some arrays in one array.
+
+    :param parts: at least one array, all of one layout.
+    :return: a new array; `numpy.concatenate` would forget that rows are records.
+    """
+    arrays = list(parts)
+    rows = np.zeros(sum(map(len, arrays)), arrays[0].dtype)
+    at = 0
+    for array in arrays:
+        rows[at : at + len(array)] = array
+        at += len(array)
+    return rows
 
 
 class Record:
@@ -189,7 +219,7 @@ _layouts: dict[type[Record], np.dtype[np.void]] = {}
 def _layout(kind: type[Record]) -> np.dtype[np.void]:
     hints = get_type_hints(kind, include_extras=True)
     columns = [(name, *_column(hints[name])) for name in _declared(kind)]
-    return np.dtype((np.record, np.dtype(columns, align=True)))
+    return np.dtype((Row, np.dtype(columns, align=True)))
 
 
 def _declared(kind: type) -> dict[str, None]:

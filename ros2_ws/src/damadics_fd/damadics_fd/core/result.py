@@ -40,7 +40,8 @@ class Result:
 
         :return: mask.
         """
-        return self.reason == 0
+        mask: NDArray[np.bool_] = self.reason == 0
+        return mask
 
     @property
     def counters(self) -> dict[str, int]:

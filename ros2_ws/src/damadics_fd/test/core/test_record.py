@@ -19,6 +19,8 @@ class Filter(Record):
 class Counts(Record):
     seen: int
     ready: bool
+    base: float  # numpy has attributes of these names
+    mean: Annotated[Floats, 2]
 
 
 class Memory(Counts, Filter):
@@ -35,6 +37,7 @@ def _step(m: Memory, x: float) -> float:
     m.pair[1].gain = x * x
     m.main.gain = 2.0 * x
     m.ready = True
+    m.base += x
     return m.matrix[1, 2] + m.gain
 
 
@@ -53,7 +56,7 @@ def _filled():
 
 def test_the_layout_follows_the_declaration():
     assert Memory.names() == (
-        *('seen', 'ready', 'a', 'gain'),  # of the bases, in their order
+        *('seen', 'ready', 'base', 'mean', 'a', 'gain'),  # of the bases, in their order
         *('matrix', 'last', 'main', 'pair'),
     )
     dtype = Memory.dtype()
@@ -74,6 +77,15 @@ def test_compiled_code_writes_the_record_it_is_given():
     record = Memory.new()
     _step(record, 1.0)
     assert record.seen == 1
+
+
+@pytest.mark.parametrize('base', [_step, getattr(_step, 'py_func', _step)])
+def test_fields_hide_the_attributes_of_numpy(base):
+    rows = _filled()
+    rows['base'], rows['mean'] = 1.5, (2.0, 3.0)
+    base(rows[0], 4.0)
+    record = rows[0]
+    assert (record.base, record.mean.tolist(), record.main.gain) == (5.5, [2.0, 3.0], 8.0)
 
 
 def test_plain_data_brings_the_record_back():

@@ -4,8 +4,10 @@
 
 import numpy as np
 import pytest
+import yaml
 from damadics_fd.core.modes import MODES
 from damadics_fd.core.settings import Settings, SettingsError
+from damadics_fd.core.settings.document import ValveDocument
 
 ROWS = [row for row in Settings.describe() if row['name'] != 'mode']
 TOGETHER = {  # settings that bound one another: what has to change with them
@@ -81,3 +83,22 @@ def test_the_action_gives_the_signs(air_to, flow_to, signs):
     x = 0.0 if air_to == 'close' else 1.0
     away = -(x + record.spring_origin) * (1 if air_to == 'close' else -1)
     assert away == -settings.preload
+
+
+def test_the_file_of_a_valve_says_what_differs_and_comes_back():
+    settings = Settings.for_mode('scada', air_to='open', kv=40.0, plug_table=[0.9] * 12)
+    document = ValveDocument(settings, 'LV-101', 'references/LV-101')
+    content = yaml.safe_load(yaml.safe_dump(document.plain()))
+    named = set(content['/**']['ros__parameters'])
+    assert named == {'mode', 'actuator', 'air_to', 'kv', 'plug_table'}
+    assert ValveDocument.read(content) == document
+    content['/**/detector'] = {'ros__parameters': {'alarm_folder': '', 'latch': False}}
+    read = ValveDocument.read(content)
+    assert (read.settings.latch, read.actuator) == (False, 'LV-101')
+    assert ValveDocument.read(content, 'monitor').settings.mode == 'monitor'
+
+
+@pytest.mark.parametrize('content', [None, [], {'/**': None}, {'/**': {'ros__parameters': []}}])
+def test_a_file_without_parameters_is_refused(content):
+    with pytest.raises(SettingsError, match='ros__parameters'):
+        ValveDocument.read(content)

@@ -11,6 +11,7 @@ import rclpy
 from builtin_interfaces.msg import Time
 from damadics_msgs.msg import Estimate as EstimateMessage
 from damadics_msgs.msg import FaultEvent, FaultFlag, FaultState, Float64Stamped, Measurement
+from rclpy.context import Context
 from rclpy.duration import Duration
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
@@ -94,10 +95,13 @@ class Player(Node):
     :param rate: speed in multiples of real time.
     :param monitor: what judges the samples; None publishes the samples alone.
     :param tag: of the actuator.
+    :param context: of ROS 2; the process's where it is None.
     """
 
-    def __init__(self, rate: float, monitor: Chain | None, tag: str) -> None:
-        super().__init__('replay')
+    def __init__(
+        self, rate: float, monitor: Chain | None, tag: str, context: Context | None = None
+    ) -> None:
+        super().__init__('replay', context=context)
         self._rate = rate
         self._time = self.create_publisher(Clock, '/clock', 10)
         self._measurement = self.create_publisher(Measurement, 'measurement', qos.SAMPLES)

@@ -30,6 +30,7 @@ from damadics_fd.commands.replay.output import (
 from damadics_fd.core.modes import MODES
 from damadics_fd.core.monitor import estimator_for
 from damadics_fd.core.settings import Settings, SettingsError
+from damadics_fd.core.settings.document import parameters_in
 from damadics_fd.ros.arguments import split_ros_args
 from damadics_fd.store.references import ReferenceFileError, load_reference
 
@@ -188,15 +189,11 @@ def _parameters(path: Path) -> dict[str, Any]:
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
         raise SettingsError([f'{path} cannot be read: {error}']) from error
     known = {entry['name'] for entry in Settings.describe()}
-    values: dict[str, Any] = {}
-    nodes = content.values() if isinstance(content, dict) else []
-    for node in nodes:
-        parameters = node.get('ros__parameters') if isinstance(node, dict) else None
-        if isinstance(parameters, dict):
-            values |= {name: value for name, value in parameters.items() if name in known}
-    if not values:
-        raise SettingsError([f'{path} holds no ros__parameters of estimator or detector'])
-    return values
+    try:
+        given = parameters_in(content)
+    except SettingsError as error:
+        raise SettingsError([f'{path}: {problem}' for problem in error.problems]) from error
+    return {name: value for name, value in given.items() if name in known}
 
 
 def main(args: list[str] | None = None) -> int:

@@ -3,6 +3,7 @@
 """The estimator of the modes paper and monitor: one measurement in, one estimate out."""
 
 from collections.abc import Mapping, Sequence
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +44,17 @@ class Estimator(Intake):
         self.state = State.rows()
         self._estimate = Estimate.rows()
         self.reset()
+
+    def hold(self, quality: Array, state: Array) -> Self:
+        """
+        Go on with a state that is kept elsewhere, in place.
+
+        :param quality: of the input, an array of length 1 like the following.
+        :param state: of the estimator.
+        :return: this estimator.
+        """
+        self.quality, self.state = quality, state
+        return self
 
     def reset(self) -> None:
         """Forget everything: what was learned, the filters and the counters."""

@@ -4,7 +4,7 @@
 
 from collections.abc import Mapping, Sequence
 from operator import attrgetter
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +50,20 @@ class Detector:
         self._rows = Decision.rows()
         self.reset()
 
+    def hold(self, state: Array, signature: Array, estimate: Array, decision: Array) -> Self:
+        """
+        Go on with a state that is kept elsewhere, in place.
+
+        :param state: of the detector; each is an array of length 1, like the following.
+        :param signature: state of the signature.
+        :param estimate: the latest one.
+        :param decision: the latest one.
+        :return: this detector.
+        """
+        self.state, self._estimate, self._decision = state, estimate, decision
+        self.signature.state = signature
+        return self
+
     def reset(self) -> None:
         """Forget everything, alarms too."""
         self.state[:] = State.rows()
@@ -66,7 +80,7 @@ class Detector:
         :return: the decision; its `events` are the transitions of the alarm at this sample.
         """
         self._estimate[0] = _VALUES(estimate)
-        self.judge(ACCEPTED, self._estimate, self._rows)
+        self._judge(ACCEPTED, self._estimate, self._rows, True, 0)
         return self.decision
 
     def judge(
@@ -88,7 +102,21 @@ class Detector:
         :param first: row to begin with.
         :return: the row after the last one, and the number of decisions with a transition.
         """
-        done, kept = judge(
+        done, kept = self._judge(reason, estimates, decisions, keep, first)
+        judged = np.flatnonzero(reason[first:done] == 0)
+        if len(judged):
+            self._estimate[0] = estimates[first + judged[-1]]
+        return done, kept
+
+    def _judge(
+        self,
+        reason: NDArray[np.uint8],
+        estimates: Array,
+        decisions: Array,
+        keep: bool,
+        first: int,
+    ) -> tuple[int, int]:
+        return judge(
             self.state,
             self._settings,
             self.signature.state,
@@ -100,10 +128,6 @@ class Detector:
             keep,
             first,
         )
-        judged = np.flatnonzero(reason[first:done] == 0)
-        if len(judged):
-            self._estimate[0] = estimates[first + judged[-1]]
-        return done, kept
 
     @property
     def decision(self) -> Decision:

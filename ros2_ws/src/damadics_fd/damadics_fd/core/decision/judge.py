@@ -138,8 +138,8 @@ def report(s: State, g: Any, gc: Any, e: Estimate, d: Decision) -> None:
 def judge(
     s: Rows[State],
     c: Rows[Settings],
-    g: NDArray,
-    gc: NDArray,
+    g: Array,
+    gc: Array,
     reason: NDArray[np.uint8],
     e: Rows[Estimate],
     d: Array,
@@ -186,7 +186,7 @@ def judge(
 
 
 @jit
-def show(s: Rows[State], g: NDArray, gc: NDArray, e: Rows[Estimate], d: Rows[Decision]) -> None:
+def show(s: Rows[State], g: Array, gc: Array, e: Rows[Estimate], d: Rows[Decision]) -> None:
     """
     Copy the state of the alarm into a decision; `report` for arrays of length 1.
 

@@ -4,6 +4,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,6 +53,17 @@ class ScadaEstimator(Intake):
         self.shown = Shown.rows()
         self._estimate = Estimate.rows()
         self.reset()
+
+    def hold(self, quality: Array, shown: Array) -> Self:
+        """
+        Go on with a state that is kept elsewhere, in place.
+
+        :param quality: of the input, an array of length 1 like the following.
+        :param shown: what the estimates show.
+        :return: this estimator.
+        """
+        self.quality, self.shown = quality, shown
+        return self
 
     def reset(self) -> None:
         """Forget everything: what was learned, the models and the counters."""

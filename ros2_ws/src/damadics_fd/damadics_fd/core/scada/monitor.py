@@ -210,6 +210,26 @@ class ScadaMonitor:
             return 1.0
         return min(float(self.state.t - self.state.t_first) / self._learn_until, 1.0)
 
+    def hold(self, states: NDArray, reference: NDArray) -> None:
+        """Go on with a state and a reference that are kept elsewhere, arrays of length 1."""
+        self._state, self._given, self.reference = states, reference, reference
+
+    def seen_bytes(self) -> bytes:
+        """Return what was seen of a valve that is still learned, to be taken up elsewhere."""
+        until = np.float64(self._learn_until).tobytes()
+        return self._state.tobytes() + until + self._buffer[: self._filled].tobytes()
+
+    def restore_seen(self, seen: bytes) -> None:
+        """Go on learning with what `seen_bytes` returned; ValueError where it is not that."""
+        size = MONITOR.itemsize
+        rows, rest = divmod(len(seen) - size - 8, 7 * 8)
+        if rows < 0 or rest:
+            raise ValueError('what was seen of the valve is damaged: learn it anew')
+        self._state = np.frombuffer(seen, MONITOR, 1).copy()
+        self._learn_until = float(np.frombuffer(seen, np.float64, 1, size)[0])
+        self._buffer = np.frombuffer(seen, np.float64, 7 * rows, size + 8).reshape(rows, 7).copy()
+        self._filled = rows
+
     @property
     def states(self) -> NDArray:
         """Return the array of length 1 that holds the record of the compiled step."""

@@ -177,9 +177,9 @@ def material(s: Any, c: Any, before: bool) -> bool:
     share = HYSTERESIS if before else 1.0
     most = abs(s.cause_value) + 2.0 * s.cause_std
     if s.cause in (CAUSE_FRICTION_UP, CAUSE_FRICTION_DOWN):
-        return most >= share * c.material_friction
+        return bool(most >= share * c.material_friction)
     if s.cause in (CAUSE_SPRING_STIFFER, CAUSE_SPRING_SOFTER):
-        return most >= share * c.material_spring
+        return bool(most >= share * c.material_spring)
     return True
 
 

@@ -92,4 +92,4 @@ def growth_time(s: Any) -> float:
     :return: [10 s] since the alarm, at most 3.
     """
     since = (s.t - s.alarm_t) * 1e-10
-    return max(0.0, min(3.0, since))
+    return float(max(0.0, min(3.0, since)))

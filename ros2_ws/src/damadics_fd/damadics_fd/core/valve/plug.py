@@ -78,4 +78,5 @@ def recoveries(table: Sequence[float], x: Floats) -> Floats:
     :param x: positions [1], any shape.
     :return: K_m [1], of the same shape.
     """
-    return np.interp(x, _NODES, np.asarray(table))
+    km: Floats = np.interp(x, _NODES, np.asarray(table))
+    return km

@@ -1,0 +1,147 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""What banks of every mode hold: settings, detectors, latest estimates and decisions."""
+
+import hashlib
+from collections.abc import Sequence
+
+import numpy as np
+
+from damadics_fd.core.approximator.state import Estimate
+from damadics_fd.core.bank.rows import Reasons
+from damadics_fd.core.decision.detector import Detector
+from damadics_fd.core.decision.events import Decision
+from damadics_fd.core.intake import Intake
+from damadics_fd.core.quality import ACCEPTED, Quality, Refused
+from damadics_fd.core.record import Array, Floats, Ints, stacked
+from damadics_fd.core.settings import Settings
+
+MARK = 16  # bytes of the digest that a state begins with
+
+
+class Held:
+    """
+    Hold the records of valves that every mode has.
+
+    :param settings: of each valve.
+    :param classes: see `Detector`.
+    """
+
+    def __init__(self, settings: Sequence[Settings], classes: Sequence[int]) -> None:
+        self.classes = classes
+        self.settings = list(dict.fromkeys(settings))  # each once
+        place = {one: w for w, one in enumerate(self.settings)}
+        self.which = np.array([place[one] for one in settings], np.int64)
+        self.records = stacked(one.record() for one in self.settings)
+        firsts = [Detector(one, classes) for one in self.settings]
+        self.signature_records = stacked(first.signature.record for first in firsts)
+        count = len(settings)
+        self.quality = Quality.rows(count)
+        self.detectors = np.repeat(firsts[0].state, count)
+        self.signatures = np.repeat(firsts[0].signature.state, count)
+        self.estimates = Estimate.rows(count)
+        self.decisions = Decision.rows(count)
+        self.refused: dict[int, Refused] = {}
+
+    def of(self, v: int) -> Settings:
+        """
+        Return the settings of a valve.
+
+        :param v: which.
+        :return: the settings.
+        """
+        return self.settings[int(self.which[v])]
+
+    def detector(self, v: int) -> Detector:
+        """
+        Return the detector of a valve.
+
+        :param v: which.
+        :return: it works on the records here.
+        """
+        part = slice(v, v + 1)
+        return Detector(self.of(v), self.classes).hold(
+            self.detectors[part], self.signatures[part], self.estimates[part], self.decisions[part]
+        )
+
+    def stamps_before(self, valve: Ints) -> Ints:
+        """
+        Return the last accepted stamp of the valve of each row, before the rows.
+
+        :param valve: of each row.
+        :return: stamps [ns].
+        """
+        stamps: Ints = self.quality['stamp'][valve]
+        return stamps
+
+    def note_refused(
+        self,
+        reason: Reasons,
+        valve: Ints,
+        stamp: Ints,
+        signals: Sequence[Floats],
+        before: Ints,
+    ) -> None:
+        """
+        Remember the last refused sample of each valve.
+
+        :param reason: of each row; the following are columns of the rows too.
+        :param before: as `stamps_before` returns it.
+        """
+        refused = np.flatnonzero(reason)
+        for i in {int(valve[i]): i for i in refused}.values():  # the last row of each valve
+            v = int(valve[i])
+            earlier = np.flatnonzero((valve[:i] == v) & (reason[:i] == ACCEPTED))
+            last = int(stamp[earlier[-1]]) if len(earlier) else int(before[i])
+            intake = Intake(self.of(v))
+            values = [float(signal[i]) for signal in signals]
+            self.refused[v] = intake.note(int(reason[i]), int(stamp[i]), values, last)
+
+    def state_arrays(self) -> list[Array]:
+        """
+        Return the arrays with a record of each valve.
+
+        :return: what `tobytes` tells.
+        """
+        return [self.quality, self.detectors, self.signatures, self.estimates, self.decisions]
+
+    def records_size(self) -> int:
+        """
+        Return how many bytes the records of a valve take, with their digest.
+
+        :return: the number.
+        """
+        return MARK + sum(array.dtype.itemsize for array in self.state_arrays())
+
+    def tobytes(self, v: int) -> bytes:
+        """
+        Return the records of a valve.
+
+        :param v: which.
+        :return: a digest of their layout, then the records.
+        """
+        return self._mark() + b''.join(array[v].tobytes() for array in self.state_arrays())
+
+    def restore_bytes(self, v: int, state: bytes) -> None:
+        """
+        Take up the records of a valve.
+
+        :param v: which.
+        :param state: as from `tobytes`.
+        :raises ValueError: where it is not that.
+        """
+        if state[:MARK] != self._mark() or len(state) != self.records_size():
+            raise ValueError(
+                'the state of the valve is of another mode or version, or damaged: '
+                'move what was learned and the alarm instead'
+            )
+        at = MARK
+        for array in self.state_arrays():
+            size = array.dtype.itemsize
+            array[v : v + 1].view(np.uint8)[:] = np.frombuffer(state, np.uint8, size, at)
+            at += size
+        self.refused.pop(v, None)
+
+    def _mark(self) -> bytes:
+        layouts = '\n'.join(str(array.dtype.descr) for array in self.state_arrays())
+        return hashlib.sha256(f'{self.settings[0].mode}\n{layouts}'.encode()).digest()[:MARK]

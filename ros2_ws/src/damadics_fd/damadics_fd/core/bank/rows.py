@@ -1,0 +1,199 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""
+The loops over rows {valve, stamp, seven signals} of many valves, compiled.
+
+Compiled code has no bounds check: `Bank.take` checks the rows first.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from damadics_fd.core.approximator import step as approximator
+from damadics_fd.core.approximator.state import Estimate, State
+from damadics_fd.core.decision import judge
+from damadics_fd.core.jit import jit
+from damadics_fd.core.quality import ACCEPTED, Quality
+from damadics_fd.core.record import Array, Floats, Ints, Rows
+from damadics_fd.core.scada import kernel
+from damadics_fd.core.settings import Settings
+
+LATER = 255  # instead of a reason: the valve is still learned in mode scada, which is not compiled
+Reasons = NDArray[np.uint8]
+
+
+@jit
+def decide(
+    ds: Rows[judge.State],
+    g: Array,
+    e: Rows[Estimate],
+    d: Array,
+    v: int,
+    c: Settings,
+    gc: Array,
+    w: int,
+) -> bool:
+    """
+    Judge the latest estimate of one valve.
+
+    :param ds: detector states.
+    :param g: states of the signature.
+    :param e: latest estimates.
+    :param d: latest decisions, written.
+    :param v: which valve.
+    :param c: its settings.
+    :param gc: settings of signatures.
+    :param w: which of them are the valve's.
+    :return: True where a transition happened or the flag shows something else.
+    """
+    now = d[v]
+    fault, state, level = now.fault, now.state, now.level
+    judge.step(ds[v], c, g[v], gc[w], e[v], now)
+    judge.report(ds[v], g[v], gc[w], e[v], now)
+    return bool(
+        now.transitions != 0 or now.fault != fault or now.state != state or now.level != level
+    )
+
+
+@jit
+def take_approximator(
+    q: Rows[Quality],
+    s: Rows[State],
+    ds: Rows[judge.State],
+    g: Array,
+    e: Rows[Estimate],
+    d: Array,
+    which: Ints,
+    c: Rows[Settings],
+    gc: Array,
+    valve: Ints,
+    reason: Reasons,
+    changed: Ints,
+    decisions: Array,
+    stamp: Ints,
+    cv: Floats,
+    x1: Floats,
+    p1: Floats,
+    p2: Floats,
+    t1: Floats,
+    flow: Floats,
+    ps: Floats,
+) -> int:
+    """
+    Take rows of valves in the modes paper and monitor.
+
+    :param q: quality states; these and the following hold a record per valve.
+    :param s: estimator states.
+    :param ds: detector states.
+    :param g: states of the signature.
+    :param e: latest estimates.
+    :param d: latest decisions.
+    :param which: the valve's place among the settings.
+    :param c: settings.
+    :param gc: settings of signatures.
+    :param valve: of each row.
+    :param reason: written: ACCEPTED or the reason of refusal.
+    :param changed: written: rows at which a transition happened or a flag changed.
+    :param decisions: written: the decisions at these rows.
+    :param stamp: of each row; the following are columns of the rows too.
+    :return: how many such rows.
+    """
+    count = 0
+    for i in range(len(valve)):
+        v = valve[i]
+        w = which[v]
+        reason[i] = approximator.step(
+            q[v],
+            s[v],
+            c[w],
+            e[v],
+            stamp[i],
+            cv[i],
+            x1[i],
+            p1[i],
+            p2[i],
+            t1[i],
+            flow[i],
+            ps[i],
+        )
+        if reason[i] == ACCEPTED and decide(ds, g, e, d, v, c[w], gc, w):
+            changed[count] = i
+            decisions[count] = d[v]
+            count += 1
+    return count
+
+
+@jit
+def take_control_room(
+    q: Rows[Quality],
+    a: Rows[kernel.Shown],
+    states: Array,
+    settings: Array,
+    reference: Array,
+    learned: NDArray[np.bool_],
+    blank: Array,
+    ds: Rows[judge.State],
+    g: Array,
+    e: Rows[Estimate],
+    d: Array,
+    which: Ints,
+    c: Rows[Settings],
+    gc: Array,
+    valve: Ints,
+    reason: Reasons,
+    changed: Ints,
+    decisions: Array,
+    stamp: Ints,
+    cv: Floats,
+    x1: Floats,
+    p1: Floats,
+    p2: Floats,
+    t1: Floats,
+    flow: Floats,
+    ps: Floats,
+) -> int:
+    """
+    Take rows of valves in mode scada; those of valves that are still learned stay for later.
+
+    :param q: as for `take_approximator`, like all that is not named here.
+    :param a: what the estimates show.
+    :param states: states of models and tests.
+    :param settings: their settings.
+    :param reference: what was learned.
+    :param learned: of which valves.
+    :param blank: an empty state of models and tests, in an array of length 1.
+    :return: rows at which a transition happened or a flag changed.
+    """
+    count = 0
+    row = np.empty(7)
+    for i in range(len(valve)):
+        v = valve[i]
+        if not learned[v]:
+            reason[i] = LATER
+            continue
+        w = which[v]
+        reason[i] = kernel.take(
+            q[v],
+            a[v],
+            states,
+            v,
+            c[w],
+            settings[w : w + 1],
+            reference,
+            blank,
+            row,
+            e[v],
+            stamp[i],
+            cv[i],
+            x1[i],
+            p1[i],
+            p2[i],
+            t1[i],
+            flow[i],
+            ps[i],
+        )
+        if reason[i] == ACCEPTED and decide(ds, g, e, d, v, c[w], gc, w):
+            changed[count] = i
+            decisions[count] = d[v]
+            count += 1
+    return count
