@@ -2,15 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the tests of the page share: its address, a browser, the state of a tile."""
 
+import json
 import os
-import re
 import socket
 import time
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
 from contextlib import contextmanager
-from html import unescape
 from pathlib import Path
 from typing import Any
 
@@ -71,7 +70,7 @@ def browser() -> Iterator[Any]:
 
 class Tile:
     """
-    The tile of one valve: on the page in a browser, or else in the page as it is served.
+    The tile of one valve: on the page in a browser, or else as the page's server has it.
 
     :param address: of the fleet page.
     :param valve: name of the valve.
@@ -91,10 +90,8 @@ class Tile:
             return self._page.evaluate(
                 f"document.querySelector('[data-valve={self._valve}]')?.dataset.kind || ''"
             )
-        with urllib.request.urlopen(self._address, timeout=5.0) as answer:
-            text = unescape(answer.read().decode()).replace('\\"', '"')
-        found = re.search(rf'data-valve="{self._valve}" data-kind="(\w+)"', text)
-        return found[1] if found else ''
+        with urllib.request.urlopen(f'{self._address}/state', timeout=5.0) as answer:
+            return json.load(answer).get(self._valve, '')
 
     def wait(self, kinds: tuple[str, ...], patience: float) -> float:
         """Wait until the tile is of one of the kinds and return how long that took."""

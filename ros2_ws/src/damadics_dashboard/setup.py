@@ -10,7 +10,11 @@ setup(
     name=package,
     version=ElementTree.parse('package.xml').findtext('version'),
     packages=find_packages(exclude=['test']),
-    package_data={package: ['static/*']},
+    package_data={
+        package: ['static/*'],
+        f'{package}.words': ['*.yaml'],
+        f'{package}.pages': ['templates/*.html'],
+    },
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/' + package]),
         ('share/' + package, ['package.xml']),
@@ -21,6 +25,11 @@ setup(
     maintainer_email='maintainers@damadics-fd.example',
     description='A web page for the people at the plant.',
     license='Apache-2.0',
-    extras_require={'test': ['pytest']},
-    entry_points={'console_scripts': ['dashboard = damadics_dashboard.dashboard:main']},
+    extras_require={'test': ['pytest'], 'report': ['fpdf2==2.8.9']},
+    entry_points={
+        'console_scripts': [
+            'dashboard = damadics_dashboard.dashboard:main',
+            'report = damadics_dashboard.report.command:main',
+        ]
+    },
 )

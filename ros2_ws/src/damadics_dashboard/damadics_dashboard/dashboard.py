@@ -3,15 +3,21 @@
 """Command `dashboard`: the web page, live from ROS 2 topics."""
 
 import argparse
+import asyncio
 import os
 import signal
 import sys
 from pathlib import Path
-from typing import Any
+from types import FrameType
+from typing import TYPE_CHECKING
 
 from damadics_fd.ros.arguments import command_parser, split_ros_args, state_folder
+from damadics_fd.store.access import Access, AccessError, parse_access, read_access
 
-from damadics_dashboard.access import AccessError, Guard, check_binding
+from damadics_dashboard.server.access import Guard, check_binding
+
+if TYPE_CHECKING:
+    from damadics_dashboard.live.watcher import Watcher
 
 HERE = Path(__file__).parent
 EXAMPLE = """example:
@@ -32,12 +38,13 @@ def parser() -> argparse.ArgumentParser:
         EXAMPLE,
     )
     p.add_argument('--host', default='127.0.0.1', help='address to serve on (127.0.0.1)')
-    p.add_argument('--port', type=int, default=8080, help='port to serve on (8080)')
+    p.add_argument('--port', type=_port, default=8080, help='port to serve on (8080)')
     p.add_argument(
         '--token-file',
         type=Path,
         metavar='FILE',
-        help='file with the token that other machines must show; or set DAMADICS_DASHBOARD_TOKEN',
+        help='file with the tokens that other machines must show, a line each: operator TOKEN '
+        'NAME, or viewer TOKEN NAME; or set DAMADICS_DASHBOARD_TOKEN',
     )
     p.add_argument(
         '--state',
@@ -58,23 +65,26 @@ def parser() -> argparse.ArgumentParser:
     return p
 
 
-def read_token(path: Path | None) -> str:
-    """
-    Read the token.
+def _port(text: str) -> int:
+    """Read a port."""
+    number = int(text) if text.isdigit() else 0
+    if not 0 < number < 65536:
+        raise argparse.ArgumentTypeError(f'{text} is no port: give a number from 1 to 65535')
+    return number
 
-    :param path: of its file; otherwise the environment has it.
-    :return: the token, '' for none.
-    :raises AccessError: where the file cannot be read or is empty.
+
+def read_tokens(path: Path | None) -> Access:
     """
-    if path is None:
-        return os.environ.get('DAMADICS_DASHBOARD_TOKEN', '').strip()
-    try:
-        token = path.read_text().strip()
-    except OSError as problem:
-        raise AccessError(f'--token-file {path}: {problem.strerror}') from problem
-    if not token:
-        raise AccessError(f'--token-file {path} is empty: openssl rand -hex 16 > {path}')
-    return token
+    Read the tokens.
+
+    :param path: of their file; otherwise the environment has one.
+    :return: what each of them allows; nothing where nobody needs one.
+    :raises AccessError: where the file cannot be read, is empty or has a bad token.
+    """
+    if path is not None:
+        return read_access(path)
+    token = os.environ.get('DAMADICS_DASHBOARD_TOKEN', '').strip()
+    return parse_access([token], 'DAMADICS_DASHBOARD_TOKEN') if token else Access()
 
 
 def main(args: list[str] | None = None) -> int:
@@ -87,63 +97,60 @@ def main(args: list[str] | None = None) -> int:
     words, ros_args = split_ros_args(args)
     options = parser().parse_args(words)
     try:
-        token = read_token(options.token_file)
-        check_binding(options.host, token)
+        access = read_tokens(options.token_file)
+        check_binding(options.host, access)
         signal.signal(signal.SIGTERM, signal.default_int_handler)
-        serve(options, token, ros_args)
+        return serve(options, access, ros_args)
     except KeyboardInterrupt:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         return 0  # the server repeats the signal after its clean end
     except AccessError as problem:
         print(f'dashboard: {problem}', file=sys.stderr)
-        return 1
+        return 2
     except OSError as problem:
         print(f'dashboard: {problem}; give another --port or --state', file=sys.stderr)
-        return 1
-    return 0
+        return 2
 
 
-def serve(options: argparse.Namespace, token: str, ros_args: list[str]) -> None:
+def serve(options: argparse.Namespace, access: Access, ros_args: list[str]) -> int:
     """
     Serve the page.
 
     :param options: the command line.
-    :param token: the token, '' for none.
+    :param access: the tokens that are accepted.
     :param ros_args: arguments of ROS 2, such as its enclave.
+    :return: exit code: 1 where the ROS side failed.
     """
     _check_port(options.host, options.port)
     # after the check of the arguments, for they take a second
+    from damadics_fd.store.intervals import Intervals
     from nicegui import app, ui
 
-    from damadics_dashboard.fleet_page import fleet_page, history_page
-    from damadics_dashboard.frame import FAVICON
-    from damadics_dashboard.history import History
-    from damadics_dashboard.replay_page import replay_page
-    from damadics_dashboard.valve_page import valve_page
-    from damadics_dashboard.watcher import Watcher
+    from damadics_dashboard.live.trend_points import TrendPoints
+    from damadics_dashboard.live.watcher import Watcher
+    from damadics_dashboard.pages.frame import FAVICON
+    from damadics_dashboard.pages.routes import add_routes
+    from damadics_dashboard.server.limits import PatientProtocol, SizeLimit
+    from damadics_dashboard.store.history import History
 
     history = History(options.state / 'history.sqlite')
-    watcher = Watcher(history, options.follow, ros_args)
+    trends = TrendPoints(Intervals(options.state / 'trends.sqlite'))
+    watcher = Watcher(history, trends, options.follow, ros_args)
     app.add_static_files('/assets', str(HERE / 'static'))
-    app.add_middleware(Guard, token=token)
-    ui.page('/')(lambda: fleet_page(watcher))
-    ui.page('/history')(lambda: history_page(watcher))
-
-    ui.page('/replay')(lambda: replay_page(watcher))
-
-    @ui.page('/valve/{name}')
-    def valve(name: str) -> None:
-        valve_page(watcher, name)
-
+    app.add_middleware(SizeLimit)
+    app.add_middleware(Guard, access=access)
+    add_routes(watcher)
     app.on_startup(_take_one_signal)
     app.on_startup(watcher.start)
     app.on_shutdown(watcher.stop)
+    app.on_shutdown(trends.close)
     app.on_shutdown(history.close)
+    app.on_startup(lambda: _end_with(watcher))
     shown = f'[{options.host}]' if ':' in options.host else options.host
     app.on_startup(
         lambda: print(
             f'The dashboard is at http://{shown}:{options.port}'
-            + ('/?token=...' if token else ''),
+            + ('' if access.open else '/?token=...'),
             flush=True,
         )
     )
@@ -161,7 +168,22 @@ def serve(options: argparse.Namespace, token: str, ros_args: list[str]) -> None:
         unocss=None,
         uvicorn_logging_level='warning',
         reconnect_timeout=10.0,
+        http=PatientProtocol,
     )
+    return 0 if watcher.failure is None else 1
+
+
+async def _end_with(watcher: 'Watcher') -> None:
+    """End this process where its ROS side has ended, so that `run` starts it again."""
+    from nicegui import app, background_tasks
+
+    async def watch() -> None:
+        while watcher.failure is None:
+            await asyncio.sleep(0.5)
+        print(f'dashboard: ROS 2 side failed: {watcher.failure!r}', file=sys.stderr, flush=True)
+        app.shutdown()
+
+    background_tasks.create(watch(), name='watch the ROS side')
 
 
 def _take_one_signal() -> None:
@@ -169,7 +191,7 @@ def _take_one_signal() -> None:
     both = (signal.SIGINT, signal.SIGTERM)
     of_server = {number: signal.getsignal(number) for number in both}
 
-    def end(number: int, frame: Any) -> None:
+    def end(number: int, frame: FrameType | None) -> None:
         for other in both:
             signal.signal(other, signal.SIG_IGN)
         of_server[number](number, frame)

@@ -92,7 +92,8 @@ class Cause:
             'confidence': number(min(confidence, MOST_CERTAIN)),
             'second': second.replace('_', ' '),
         }
-        known = [] if math.isnan(value) or not self.detail else [self.detail.format(**words)]
+        detail = self.detail.split(' ±')[0] if math.isnan(std) else self.detail
+        known = [] if math.isnan(value) or not detail else [detail.format(**words)]
         if not math.isnan(confidence):
             sure = 'Wahrscheinlichkeit' if self.language == 'de' else 'confidence'
             known.append(f'{sure} {words["confidence"]:.0%}')

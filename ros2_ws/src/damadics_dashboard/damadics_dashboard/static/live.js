@@ -1,97 +1,69 @@
 // Copyright 2026 DAMADICS FD maintainers
 // SPDX-License-Identifier: Apache-2.0
-// Feeds the charts of a page: keeps their points, adds what the server sends, follows the theme.
-// The charts themselves are Apache ECharts, as NiceGUI brings it.
+// What every page watches by itself: whether its server still speaks, and how old its values are.
+// A page that only the server can turn grey stays green when the server is gone.
 
 (() => {
-  const charts = new Map(); // element id -> {spec, data}
-  const css = (name) => getComputedStyle(document.body).getPropertyValue(name).trim();
-  const chartOf = (id) => {
-    const element = typeof getElement === 'function' ? getElement(id) : undefined;
-    return element && element.chart && !element.chart.isDisposed() ? element.chart : undefined;
-  };
-  const clock = (value) => (value < 1e8
-    ? `${+value.toFixed(2)} s`
-    : new Date(value * 1000).toLocaleTimeString());
-  const short = (value) => (Math.abs(value) >= 1e-3 && Math.abs(value) < 1e4 || value === 0
-    ? `${+value.toPrecision(3)}` : value.toExponential(0));
+  const LOST = 1600; // ms without a word of the server
+  let heard = performance.now();
+  let ros = true;
+  let title = '';
+  const words = {};
+  const state = () => (performance.now() - heard > LOST ? 'lost' : (ros ? 'good' : 'off'));
 
-  function style(id) {
-    const chart = chartOf(id);
-    const { spec } = charts.get(id);
-    if (!chart) return;
-    const [ink, muted, line, card] = ['--ink', '--muted', '--line', '--card'].map(css);
-    const axis = {
-      axisLine: { lineStyle: { color: line } },
-      axisTick: { lineStyle: { color: line } },
-      splitLine: { lineStyle: { color: line, opacity: 0.6 } },
-      minorSplitLine: { lineStyle: { color: line, opacity: 0.25 } },
-      axisLabel: { color: muted },
-      nameTextStyle: { color: muted },
-    };
-    const label = (format) => ({ ...axis.axisLabel, formatter: format });
-    chart.setOption({
-      textStyle: { color: ink, fontFamily: css('--font') },
-      legend: { textStyle: { color: muted } },
-      tooltip: {
-        backgroundColor: card, borderColor: line, textStyle: { color: ink },
-        valueFormatter: (v) => (v == null ? '–' : short(v)),
-      },
-      axisPointer: { label: { formatter: (p) => (p.axisDimension === 'x' && !spec.xy
-        ? clock(p.value) : short(p.value)) } },
-      xAxis: { ...axis, axisLabel: label(spec.xy ? short : clock) },
-      yAxis: { ...axis, axisLabel: label(short) },
-      series: spec.colors.map((name) => ({
-        lineStyle: { color: css(name) }, itemStyle: { color: css(name) },
-        markArea: { itemStyle: { color: css('--alarm-area') } },
-        markLine: { lineStyle: { color: css('--muted') }, label: { color: muted } },
-      })),
+  function duration(seconds) {
+    if (seconds < 9.95) return `${seconds.toFixed(1)} s`;
+    if (seconds < 59.5) return `${Math.round(seconds)} s`;
+    const s = Math.round(seconds);
+    if (s < 3600) return `${Math.floor(s / 60)} min ${s % 60} s`;
+    const m = Math.round(seconds / 60);
+    return `${Math.floor(m / 60)} h ${m % 60} min`;
+  }
+
+  // An age that the server told is counted on here from the moment it came.
+  function tick() {
+    const now = performance.now();
+    const present = state();
+    const { body } = document;
+    if (!body) return;
+    if (body.dataset.link !== present) {
+      body.dataset.link = present;
+      const place = document.getElementById('link');
+      if (place) place.textContent = words[present] || '';
+      if (present === 'lost') say(words.lost);
+    }
+    // what the framework names in its own language, or not at all
+    if (words.language) document.documentElement.lang = words.language;
+    document.querySelectorAll('.q-uploader :is(a, input, button):not([aria-label])')
+      .forEach((element) => element.setAttribute('aria-label', words.recording_to_replay));
+    const bare = document.title.replace(/^\([^)]*\) /, '');
+    if (!title || bare !== title) title = bare;
+    const wanted = present === 'good' ? title : `(${words.short || '!'}) ${title}`;
+    if (document.title !== wanted) document.title = wanted;
+    document.querySelectorAll('[data-age]').forEach((element) => {
+      if (element.told !== element.dataset.age) {
+        element.told = element.dataset.age;
+        element.toldAt = now;
+      }
+      const text = duration(Number(element.dataset.age) + (now - element.toldAt) / 1000);
+      if (element.textContent !== text) element.textContent = text;
     });
   }
 
-  function draw(id) {
-    const chart = chartOf(id);
-    const entry = charts.get(id);
-    if (!chart || !entry) return;
-    if (entry.chart !== chart) { entry.chart = chart; style(id); }
-    const option = { series: entry.data.map((points) => ({ data: points })) };
-    if (entry.range && !entry.spec.xy) {
-      option.xAxis = { min: entry.range[0], max: entry.range[1] };
-    }
-    if (entry.areas) option.series[0].markArea = { data: entry.areas };
-    chart.setOption(option, { lazyUpdate: true });
+  // The server tells an age anew: of the one valve that the page shows.
+  function age(seconds) {
+    document.querySelectorAll('.aging').forEach((element) => {
+      if (seconds === null) return;
+      element.dataset.age = String(seconds);
+      element.told = undefined;
+    });
+    tick();
   }
 
-  // One message of the server: per chart {from, series, range, areas, all}. Points from `from` on
-  // are replaced by the new ones, points before the range are dropped.
-  function push(message) {
-    for (const [key, part] of Object.entries(message)) {
-      const id = Number(key);
-      const entry = charts.get(id);
-      if (!entry) continue;
-      entry.range = part.range || entry.range;
-      if (part.areas) entry.areas = part.areas;
-      entry.data = entry.data.map((old, n) => {
-        const fresh = part.series[n];
-        if (!fresh) return old;
-        if (part.all) return fresh;
-        const from = part.from[n];
-        const start = entry.range[0];
-        let end = old.length;
-        while (end > 0 && old[end - 1][0] >= from) end -= 1;
-        let begin = 0;
-        while (begin + 1 < end && old[begin + 1][0] < start) begin += 1;
-        return old.slice(begin, end).concat(fresh);
-      });
-      draw(id);
-    }
-    window.damadics.messages += 1;
-  }
-
-  function register(id, spec) {
-    charts.set(id, { spec, data: spec.colors.map(() => []) });
-    const wait = () => (chartOf(id) ? draw(id) : setTimeout(wait, 50));
-    wait();
+  function beat(alive) {
+    heard = performance.now();
+    ros = alive;
+    tick();
   }
 
   function say(text) {
@@ -99,9 +71,59 @@
     if (region) region.textContent = text;
   }
 
-  window.damadics = { register, push, say, messages: 0, points: (id) => charts.get(id).data };
-  const restyle = () => charts.forEach((_, id) => { style(id); });
-  const start = () => new MutationObserver(() => setTimeout(restyle, 30))
-    .observe(document.body, { attributes: true, attributeFilter: ['class'] });
-  if (document.body) start(); else document.addEventListener('DOMContentLoaded', start);
+  // Sound and notification of a new alarm, each only where the person has asked for it.
+  function alarm(text, quiet) {
+    if (!quiet) say(text);
+    if (localStorage.getItem('damadics.alert') !== 'on' || quiet) return;
+    try {
+      const context = new AudioContext();
+      [0, 0.35].forEach((after) => {
+        const tone = context.createOscillator();
+        const gain = context.createGain();
+        tone.frequency.value = 660;
+        gain.gain.value = 0.15;
+        tone.connect(gain).connect(context.destination);
+        tone.start(context.currentTime + after);
+        tone.stop(context.currentTime + after + 0.2);
+      });
+    } catch (problem) { console.warn('no sound:', problem); }
+    if ('Notification' in window && Notification.permission === 'granted') {
+      new Notification('DAMADICS FD', { body: text, tag: text });
+    }
+  }
+
+  async function alerts() {
+    const on = localStorage.getItem('damadics.alert') !== 'on';
+    localStorage.setItem('damadics.alert', on ? 'on' : 'off');
+    if (on && 'Notification' in window && Notification.permission === 'default') {
+      await Notification.requestPermission();
+    }
+    shown();
+    return on;
+  }
+
+  function shown() {
+    document.body.dataset.alert = localStorage.getItem('damadics.alert') === 'on' ? 'on' : 'off';
+  }
+
+  function begin(told) {
+    Object.assign(words, told);
+    heard = performance.now();
+    if (document.body) delete document.body.dataset.link;
+    shown();
+    tick();
+  }
+
+  window.damadics = Object.assign(window.damadics || {}, {
+    beat, age, say, alarm, alerts, begin, duration, state,
+  });
+  setInterval(tick, 200);
+  document.addEventListener('visibilitychange', tick);
 })();
+
+// The address of a page tells what it shows, so that it can be sent to somebody.
+window.damadics.remember = (name, value) => {
+  const query = new URLSearchParams(location.search);
+  query.set(name, value);
+  history.replaceState(null, '', `?${query}`);
+};

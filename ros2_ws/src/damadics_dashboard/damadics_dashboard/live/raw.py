@@ -1,0 +1,68 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Read serialised messages in batches: a page needs ten looks a second, not every message."""
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+from damadics_fd.bag.cdr.definition import Definition, parse_definition, schema_text
+from damadics_fd.bag.cdr.layout import Layout, layout_of
+from numpy.typing import NDArray
+
+from damadics_dashboard.live.traces import NANO
+
+
+@cache
+def _definition(kind: str) -> Definition:
+    return parse_definition(kind, schema_text(kind))
+
+
+class Batch:
+    """
+    Messages of one topic as they came from the wire, and their columns.
+
+    :param kind: full type name, such as `damadics_msgs/msg/Measurement`.
+    :param columns: field of the message by name of the column.
+    """
+
+    def __init__(self, kind: str, columns: dict[str, str]) -> None:
+        self._kind = kind
+        self._columns = columns
+        self._messages: list[bytes] = []
+        self._layout: Layout | None = None
+        self.dtype = np.dtype([('stamp', 'i8'), *((name, 'f8') for name in columns)])
+
+    def take(self, message: bytes) -> None:
+        """Keep one message; cheap, for it is called for each."""
+        self._messages.append(message)
+
+    def drain(self) -> NDArray[Any]:
+        """
+        Return the columns of all messages since the last call.
+
+        :return: structured array with `stamp` [ns] and the columns.
+        """
+        messages, self._messages = self._messages, []
+        parts = []
+        while messages:
+            size = len(messages[0])
+            run = next((n for n, m in enumerate(messages) if len(m) != size), len(messages))
+            parts.append(self._decode(messages[:run], size))
+            messages = messages[run:]
+        return np.concatenate(parts) if parts else np.zeros(0, self.dtype)
+
+    def _decode(self, messages: list[bytes], size: int) -> NDArray[Any]:
+        data = np.frombuffer(b''.join(messages), np.uint8).reshape(-1, size)
+        if self._layout is None or not self._layout.matches(data):
+            self._layout = layout_of(_definition(self._kind), self._kind, messages[0])
+            if not self._layout.matches(data):  # one size, other lengths inside
+                return np.concatenate([self._decode([m], size) for m in messages])
+        source = data.view(self._layout.dtype(size))[:, 0]
+        rows = np.zeros(len(data), self.dtype)
+        rows['stamp'] = (
+            source['header.stamp.sec'].astype(np.int64) * NANO + source['header.stamp.nanosec']
+        )
+        for name, path in self._columns.items():
+            rows[name] = source[path]
+        return rows

@@ -1,0 +1,307 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""What the page knows about one valve."""
+
+import math
+from collections import deque
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+from damadics_fd.core.freshness import Freshness, default_max_age
+from damadics_fd.core.text import NAME, plain
+from damadics_msgs.msg import FaultEvent, FaultFlag, Isolation, Signature
+
+from damadics_dashboard.live.raw import Batch
+from damadics_dashboard.live.traces import NANO, Trace
+
+HEARTBEAT_LOST = 2.0  # s; the detector repeats its flag every second
+SAMPLES_LOST = 0.6  # s, or three periods of the samples
+WINDOW = 600.0  # s that plots may show
+MOST_SAMPLES = 150_000
+NE107 = {
+    FaultFlag.NE107_NORMAL: '',
+    FaultFlag.NE107_MAINTENANCE_REQUIRED: 'M',
+    FaultFlag.NE107_OUT_OF_SPECIFICATION: 'S',
+    FaultFlag.NE107_FUNCTION_CHECK: 'C',
+    FaultFlag.NE107_FAILURE: 'F',
+}
+ALARMS = (FaultFlag.STATE_ALARM, FaultFlag.STATE_LATCHED, FaultFlag.STATE_UNKNOWN)
+
+
+class Condition(NamedTuple):
+    """How a valve is shown: `kind` is ok, learn, off, M, S, C or F; the rest are keys of texts."""
+
+    kind: str
+    title: str
+    detail: str
+    value: float = math.nan  # that the detail tells
+
+    @property
+    def alarm(self) -> bool:
+        """Whether the valve is shown in the colour of an alarm."""
+        return self.kind in 'MSF'
+
+
+@dataclass
+class Alarm:
+    """The present alarm of a valve, put together from its flag and its events."""
+
+    occurrence: int
+    level: int
+    state: str  # active, returned, shelved, unknown
+    acknowledged: bool
+    onset: int  # ns
+    evidence: dict[str, Any] = field(default_factory=dict)
+
+
+class Valve:
+    """
+    One valve: its latest flag, events, diagnostics and samples.
+
+    :param name: its namespace without the leading slash, '' for the root.
+    :param simulated: the clock that stamps are held against is that of /clock.
+    """
+
+    def __init__(self, name: str, simulated: bool = False) -> None:
+        self.name = name
+        self.tag = ''
+        self.flag: FaultFlag | None = None
+        self.flag_at = -1e9
+        self.threshold_at = -1e9
+        self.judged = -1  # ns, stamp of the flag
+        self.freshness = Freshness(simulated)
+        self.signature: Signature | None = None
+        self.isolation: Isolation | None = None
+        self.area = ''
+        self.learned = math.nan  # share of the learning that a fleet reports
+        self.period = 0.0
+        self.diagnostics: dict[str, dict[str, str]] = {}
+        self.levels: dict[str, int] = {}
+        self.events: deque[dict[str, Any]] = deque(maxlen=100)
+        self.acknowledged: set[int] = set()
+        self.peak = 0.0  # largest residual / threshold of this second
+        self.ratio = 0.0  # of the second before
+        self.lost = 0
+        self.batches = {
+            'measurement': Batch(
+                'damadics_msgs/msg/Measurement',
+                {name: name for name in ('cv', 'x1', 'p1', 'p2', 'flow', 't1', 'ps')},
+            ),
+            'estimate': Batch(
+                'damadics_msgs/msg/Estimate',
+                {
+                    'x2': 'x2',
+                    'residual': 'xi2',
+                    'u': 'u',
+                    'x': 'x1',
+                    'progress': 'progress',
+                    'phase': 'phase',
+                },
+            ),
+            'threshold': Batch('damadics_msgs/msg/Float64Stamped', {'rho': 'data'}),
+        }
+        self.traces = {
+            topic: Trace(tuple(batch.dtype.names[1:]), WINDOW, MOST_SAMPLES)
+            for topic, batch in self.batches.items()
+        }
+
+    @property
+    def title(self) -> str:
+        """Name for people: the namespace, or the tag where there is none."""
+        return self.name or self.tag or 'valve'
+
+    def collect(self, now: float) -> None:
+        """
+        Move the samples that have arrived into the traces.
+
+        :param now: monotonic time [s].
+        """
+        for topic, batch in self.batches.items():
+            rows = batch.drain()
+            if not len(rows):
+                continue
+            if topic == 'threshold':
+                self.threshold_at = now
+                self.freshness.heard(int(rows['stamp'][-1]), now)
+                span = (int(rows['stamp'][-1]) - self.traces['threshold'].newest) / NANO
+                self.period = min(max(span / len(rows), 0.0), 60.0)
+            elif topic == 'estimate':
+                rows['residual'] = abs(rows['residual'])
+            self.traces[topic].extend(rows)
+
+    def take_flag(self, flag: FaultFlag, now: float) -> None:
+        """
+        Take the detector's judgement.
+
+        :param flag: the message.
+        :param now: monotonic time [s].
+        """
+        if flag.threshold > 0.0:
+            self.peak = max(self.peak, flag.residual / flag.threshold)
+        if flag.header.frame_id:
+            self.tag = plain(flag.header.frame_id, NAME)
+        self.flag, self.flag_at = flag, now
+        stamp = flag.header.stamp.sec * NANO + flag.header.stamp.nanosec
+        if self.threshold_at < 0.0 and stamp != self.judged:
+            self.freshness.heard(stamp, now)
+        self.judged = stamp
+
+    def take_event(self, event: dict[str, Any]) -> None:
+        """
+        Take a transition of the alarm.
+
+        :param event: as the history stores it.
+        """
+        self.events.append(event)
+        if event['transition'] in (FaultEvent.ACKNOWLEDGED, FaultEvent.RESET):
+            self.acknowledged.add(event['occurrence'])
+        elif event['transition'] == FaultEvent.RAISED:
+            self.acknowledged.discard(event['occurrence'])
+
+    @property
+    def occurrence(self) -> int:
+        """Number of the latest alarm that an event told of."""
+        return max((e['occurrence'] for e in self.events), default=0)
+
+    def forget(self, topic: str) -> None:
+        """
+        Drop the samples of a topic that is no longer taken.
+
+        :param topic: its name.
+        """
+        self.batches[topic].drain()
+        self.traces[topic] = Trace(self.traces[topic].dtype.names[1:], WINDOW, MOST_SAMPLES)
+        if topic == 'threshold':
+            self.threshold_at, self.period = -1e9, 0.0
+
+    def second(self) -> None:
+        """Close one second of the bar that shows the largest residual against its limit."""
+        rows, limits = self.traces['estimate'].rows, self.traces['threshold'].rows
+        if len(rows) and len(limits):
+            recent = rows[-max(int(1.0 / max(self.period, 1e-3)), 1) :]
+            if limits['rho'][-1] > 0.0:
+                self.peak = max(self.peak, float(recent['residual'].max()) / limits['rho'][-1])
+        self.ratio = self.peak
+        self.peak = 0.0
+
+    def age(self, now: float, clock: int) -> float | None:
+        """
+        Return the age of the last judged sample.
+
+        :param now: monotonic time [s].
+        :param clock: ROS time [ns].
+        :return: [s], None where there has been none.
+        """
+        if self.flag is None and self.threshold_at < 0.0:
+            return None
+        arrived = now - max(self.threshold_at, self.flag_at)
+        return max(arrived, self.freshness.age(clock, now), 0.0)
+
+    @property
+    def progress(self) -> float:
+        """Share of the learning that is done, 0..1."""
+        rows = self.traces['estimate'].rows
+        if len(rows):
+            return float(rows['progress'][-1])
+        if math.isfinite(self.learned):
+            return self.learned
+        text = self.diagnostics.get('estimator', {}).get('Learning progress (%)', '0')
+        return float(text) / 100.0
+
+    def condition(self, now: float, clock: int) -> Condition:
+        """
+        Say how the valve is; silence and old judgements are never shown as health.
+
+        :param now: monotonic time [s].
+        :param clock: ROS time [ns].
+        :return: the condition.
+        """
+        flag = self.flag
+        if flag is None:
+            return Condition('off', 'not_monitored', 'no_detector')
+        silent = self._silence(flag, now, clock)
+        if silent is not None:
+            return silent
+        if flag.state == FaultFlag.STATE_NOT_MONITORING:
+            return Condition('off', 'not_monitored', 'input_refused')
+        if flag.state == FaultFlag.STATE_SHELVED:
+            return Condition('C', 'shelved', 'masked')
+        if flag.state == FaultFlag.STATE_UNKNOWN:
+            return Condition('C', 'state_unknown', 'confirm_state')
+        letter = NE107.get(flag.level, 'C') or 'M'
+        if flag.state in ALARMS:
+            active = flag.state == FaultFlag.STATE_ALARM
+            return Condition(letter, f'ne_{letter}', 'fault_present' if active else 'fault_gone')
+        if flag.state == FaultFlag.STATE_LEARNING:
+            return Condition('learn', 'learning', 'learned_share', self.progress)
+        if flag.state == FaultFlag.STATE_HEALTHY:
+            return Condition('ok', 'healthy', 'no_alarm')
+        return Condition('C', 'state_unknown', 'confirm_state')
+
+    def _silence(self, flag: FaultFlag, now: float, clock: int) -> Condition | None:
+        """Tell where nothing recent is known of the valve."""
+        quiet = now - self.threshold_at
+        heard = self.threshold_at > 0.0
+        refused = flag.state == FaultFlag.STATE_NOT_MONITORING
+        if now - self.flag_at > HEARTBEAT_LOST or (
+            heard
+            and quiet > max(SAMPLES_LOST, 3.0 * self.period)
+            and now - self.flag_at > SAMPLES_LOST
+            and not refused
+        ):
+            quiet = now - max(self.flag_at, self.threshold_at)
+            return Condition('off', 'not_monitored', 'detector_silent', quiet)
+        if heard and quiet > max(1.0, 3.0 * self.period):
+            return Condition('off', 'not_monitored', 'no_sample', quiet)
+        old = self.freshness.age(clock, now)
+        if old > default_max_age(self.period) and not refused:
+            return Condition('off', 'not_monitored', 'samples_old', old)
+        return None
+
+    def alarm(self) -> Alarm | None:
+        """
+        Return the alarm that is present, latched or shelved.
+
+        :return: None where there is none.
+        """
+        flag = self.flag
+        if flag is None:
+            return None
+        if flag.state == FaultFlag.STATE_UNKNOWN:
+            return Alarm(flag.occurrence, FaultFlag.NE107_FUNCTION_CHECK, 'unknown', False, 0)
+        if flag.occurrence == 0:
+            return None
+        if not flag.fault and flag.state not in (*ALARMS, FaultFlag.STATE_SHELVED):
+            return None
+        mine = [e for e in self.events if e['occurrence'] == flag.occurrence]
+        ends = [e for e in mine if e['transition'] in (FaultEvent.RESET, FaultEvent.RAISED)]
+        if flag.state == FaultFlag.STATE_SHELVED and (
+            not ends or ends[-1]['transition'] == FaultEvent.RESET
+        ):
+            return None
+        told = [e for e in mine if e['transition'] in (FaultEvent.RAISED, FaultEvent.CHANGED)]
+        cleared = bool(mine) and FaultEvent.CLEARED in (e['transition'] for e in mine)
+        state = {FaultFlag.STATE_ALARM: 'active', FaultFlag.STATE_LATCHED: 'returned'}.get(
+            flag.state, 'returned' if cleared else 'active'
+        )
+        known = self.diagnostics.get('detector', {}).get('Acknowledged') == 'True'
+        onset = flag.onset.sec * NANO + flag.onset.nanosec
+        evidence = dict(told[-1]) if told else {}
+        if evidence and state == 'active':  # the event tells how it was then
+            stamp = flag.header.stamp.sec * NANO + flag.header.stamp.nanosec
+            evidence |= {
+                'residual': flag.residual,
+                'threshold': flag.threshold,
+                'duration': max(stamp - onset, 0) / NANO,
+            }
+            if flag.threshold > 0.0:
+                now = flag.residual / flag.threshold
+                evidence['ratio'] = max(evidence.get('ratio') or 0.0, now)
+        return Alarm(
+            flag.occurrence,
+            flag.level,
+            'shelved' if flag.state == FaultFlag.STATE_SHELVED else state,
+            known or flag.occurrence in self.acknowledged,
+            onset,
+            evidence,
+        )

@@ -1,0 +1,140 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""The overview: one tile per valve, by area, found by search and class; and every alarm."""
+
+import time
+from typing import Any
+
+from damadics_fd.core.text import COMMENT, plain
+from nicegui import ui
+
+from damadics_dashboard.live.valve import Valve
+from damadics_dashboard.live.watcher import Watcher
+from damadics_dashboard.pages.alarms import AlarmList
+from damadics_dashboard.pages.elements import markup, tell
+from damadics_dashboard.pages.frame import card, frame
+from damadics_dashboard.pages.valve_words import address, area_of, detail_of, headline, of_limit
+from damadics_dashboard.words.texts import Texts
+
+PERIOD = 0.2  # s
+LARGE = 100  # valves from which on the page is drawn twice a second
+KINDS = ('F', 'S', 'M', 'C', 'off', 'learn', 'ok')
+START = 'ros2 run damadics_bringup run --simulate'
+Told = dict[str, Any]
+
+
+def fleet_page(watcher: Watcher) -> None:
+    """
+    Draw the page.
+
+    :param watcher: the ROS side.
+    """
+    with frame('fleet', '/', watcher) as t:
+        classes = [(kind, t(f'count_{kind}')) for kind in KINDS]
+        markup('fleet.html', t=t, classes=classes).classes('w-full')
+        trouble = ui.label('').classes('note')
+        markup('tiles.html', t=t, start=START).classes('w-full')
+        with card(t('alarms'), classes='w-full') as head:
+            with head:
+                number = ui.label('').classes('sub')
+            alarms = AlarmList(watcher, lambda: tuple(watcher.valves.values()), t, name=True)
+        tell('filters')
+        shown = Tiles(watcher, t)
+
+        def update() -> None:
+            message = shown.news()
+            if message is not None:
+                tell('fleet', message)
+            present = alarms.update()
+            number.set_text(t('number_present', number=present) if present else '')
+            problem = watcher.history.problem or watcher.trends.problem
+            trouble.set_text(plain(problem, COMMENT))
+            trouble.set_visibility(bool(problem))
+
+        update()
+        ui.timer(0.5 if len(watcher.valves) > LARGE else PERIOD, update)
+
+
+class Tiles:
+    """
+    What the browser knows of the tiles, so that only what has changed is sent.
+
+    :param watcher: the ROS side.
+    :param t: the words.
+    """
+
+    def __init__(self, watcher: Watcher, t: Texts) -> None:
+        self._watcher = watcher
+        self._t = t
+        self._told: dict[str, Told] = {}
+        self._order: list[str] | None = None
+
+    def news(self) -> Told | None:
+        """
+        Return what has changed.
+
+        :return: the message for `damadics.fleet`; ages are those of all valves.
+        """
+        now, clock = time.monotonic(), self._watcher.clock
+        valves = sorted(self._watcher.valves.values(), key=lambda v: (v.area, v.title))
+        changed: dict[str, Told] = {}
+        for valve in valves:
+            told = tile(valve, self._t, now, clock)
+            if self._told.get(valve.name) != told:
+                self._told[valve.name] = changed[valve.name] = told
+        ages = [valve.age(now, clock) for valve in valves]
+        message: Told = {
+            'tiles': changed,
+            'ages': [None if age is None else round(age, 1) for age in ages],
+        }
+        order = [valve.name for valve in valves]
+        if order != self._order:
+            self._order = message['order'] = order
+        return message
+
+
+def tile(valve: Valve, t: Texts, now: float, clock: int) -> Told:
+    """
+    Say what the tile of a valve shows.
+
+    :param valve: the valve.
+    :param t: the words.
+    :param now: monotonic time [s].
+    :param clock: ROS time [ns].
+    :return: texts and numbers by the names that the page's script knows.
+    """
+    condition = valve.condition(now, clock)
+    alarm = valve.alarm()
+    why = '' if condition.kind == 'off' and condition.value == condition.value else None
+    why = detail_of(condition, t) if why is None else t(f'{condition.detail}_short')
+    badge, hot = '', False
+    if alarm is not None:
+        what, _, _ = headline(alarm.evidence, t)
+        hot = not alarm.acknowledged
+        if condition.kind == 'off':
+            badge, why = t('alarm_open'), f'{why} · {what}'
+        else:
+            badge = t('acknowledged' if alarm.acknowledged else 'unacknowledged')
+            why = t('state_lost') if alarm.state == 'unknown' else what
+    ratio = valve.ratio
+    if valve.flag is not None and valve.flag.threshold > 0.0:
+        ratio = max(ratio, valve.flag.residual / valve.flag.threshold)
+    learning = condition.kind == 'learn'
+    state = t(condition.title)
+    return {
+        'kind': condition.kind,
+        'title': valve.title.removeprefix(f'{area_of(valve.name)}/'),
+        'tag': valve.tag if valve.tag != valve.title else '',
+        'state': state,
+        'badge': badge,
+        'hot': hot,
+        'why': why,
+        'ratio': t.percent(valve.progress) if learning else of_limit(ratio, t),
+        'share': round(min(ratio, 2.0), 2),
+        'progress': round(valve.progress, 3) if learning else -1,
+        'fresh': t('last_sample'),
+        'never': t('never'),
+        'area': valve.area or area_of(valve.name),
+        'address': address(valve.name),
+        'label': f'{valve.title}: {state}, {why}',
+    }

@@ -1,0 +1,150 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""A recorded bag through the same estimator and detector as the live nodes, for the page."""
+
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from damadics_fd.bag.errors import BagError
+from damadics_fd.bag.recording import Recording, find_recordings
+from damadics_fd.causes import load_causes
+from damadics_fd.commands.replay.bags import joined
+from damadics_fd.core.decision.events import Event
+from damadics_fd.core.monitor import monitor_for
+from damadics_fd.core.settings import Settings
+from damadics_fd.figures.decimation import Thinner
+from numpy.typing import NDArray
+
+from damadics_dashboard.live.traces import NANO, Points, block_means, envelope
+from damadics_dashboard.pages.plots import BLOCK, SMALLEST
+
+INTERVALS = 1200  # across the plots of a whole recording
+RAISED, CLEARED = 0, 1
+HEALTHY = 2  # and the states of an alarm; below it nothing was judged
+MOST_POINTS = 4000  # of the signature
+
+
+@dataclass
+class Playback:
+    """What became of one recording, with what the plots show."""
+
+    name: str
+    samples: int = 0
+    duration: float = 0.0  # s
+    events: list[Event] = field(default_factory=list)
+    problems: list[str] = field(default_factory=list)
+    curves: dict[str, Points] = field(default_factory=dict)
+    signature: list[Points] = field(default_factory=list)  # before and since the first alarm
+    range: tuple[float, float] = (0.0, 1.0)  # s
+    truth: str = ''
+    monitored: bool = False  # whether it ever judged
+
+    @property
+    def alarms(self) -> list[Event]:
+        """The alarms that were raised."""
+        return [event for event in self.events if event.transition == RAISED]
+
+    def areas(self) -> list[Any]:
+        """Mark the time of every alarm, for a plot."""
+        begin: float | None = None
+        areas = []
+        for event in self.events:
+            if event.transition == RAISED:
+                begin = event.stamp / NANO
+            elif event.transition == CLEARED and begin is not None:
+                areas.append([{'xAxis': begin}, {'xAxis': event.stamp / NANO}])
+                begin = None
+        if begin is not None:
+            areas.append([{'xAxis': begin}, {'xAxis': self.range[1]}])
+        return areas
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return the transitions as the history table takes them, newest last."""
+        rows = [{'valve': self.name, **asdict(event)} for event in self.events]
+        for row in rows:
+            if not np.isfinite(row['ratio']):
+                row['ratio'] = None
+        return rows
+
+
+def play(path: Path, mode: str, name: str = '') -> list[Playback]:
+    """
+    Replay every valve in a file.
+
+    :param path: an MCAP file, or a table.
+    :param mode: `monitor`, `paper` or `scada`.
+    :param name: that the file had where it came from.
+    :return: one result per valve.
+    :raises BagError: where there is nothing to replay; says why.
+    """
+    return [_play(recording, mode, name) for recording in find_recordings([path])]
+
+
+def _play(recording: Recording, mode: str, name: str) -> Playback:
+    topic = recording.topic if recording.topic != '/measurement' else ''
+    done = Playback(' '.join(filter(None, (name or recording.path.name, topic))))
+    settings = Settings.for_mode(mode)
+    monitor, thinner = monitor_for(settings, load_causes().classes), Thinner()
+    first = last = None
+    for columns in joined(recording.chunks(done.problems.append)):
+        result = monitor.run(columns)
+        done.events += result.events
+        done.monitored |= bool((np.asarray(result.decisions['state']) >= HEALTHY).any())
+        done.samples += len(columns['stamp'])
+        first = int(columns['stamp'][0]) if first is None else first
+        last = int(columns['stamp'][-1])
+        thinner.add(columns, result)
+    if first is None or last is None:
+        raise BagError('holds no measurement', recording.path)
+    done.duration = (last - first) / NANO
+    done.range = (first / NANO, last / NANO)
+    result, columns = thinner.thinned()
+    _draw(done, columns, result, max((last - first) // INTERVALS, 1))
+    done.truth = _truth(recording, done)
+    return done
+
+
+def _draw(done: Playback, columns: dict[str, NDArray[Any]], result: Any, width: int) -> None:
+    stamp = np.asarray(columns['stamp'])
+    order = np.argsort(stamp, kind='stable')
+    stamp = stamp[order]
+    signals = {
+        'cv': columns['cv'],
+        'x1': columns['x1'],
+        'x2': result.estimates['x2'],
+        'residual': np.maximum(result.decisions['residual'], SMALLEST),
+        'threshold': np.maximum(result.decisions['threshold'], SMALLEST),
+    }
+    done.curves = {
+        name: envelope(
+            stamp, np.asarray(values)[order], width, largest=name in ('residual', 'threshold')
+        )
+        for name, values in signals.items()
+    }
+    cloud = np.zeros(len(stamp), [('stamp', 'i8'), ('x', 'f8'), ('u', 'f8')])
+    cloud['stamp'] = stamp
+    cloud['x'], cloud['u'] = result.estimates['x1'][order], result.estimates['u'][order]
+    parts = [cloud]
+    if done.alarms:
+        parts = np.split(cloud, [int(np.searchsorted(stamp, done.alarms[0].stamp))])
+    done.signature = [
+        block_means(part, 'x', 'u', max(BLOCK, width))[:MOST_POINTS] for part in parts
+    ]
+
+
+def _truth(recording: Recording, done: Playback) -> str:
+    """Say which fault was simulated, where the recording tells."""
+    truth = recording.truth(lambda problem: None)
+    if truth is None or not len(truth['fault']):
+        return ''
+    here = np.flatnonzero(truth['fault'])
+    if not len(here):
+        return 'no fault was simulated'
+    start = int(truth['stamp'][here[0]])
+    text = f'fault f{int(truth["fault"][here[0]])} was simulated from {start / NANO:.2f} s'
+    after = [alarm for alarm in done.alarms if alarm.stamp >= start]
+    return text + (
+        f', flagged {(after[0].stamp - start) / NANO:.2f} s later' if after else ', not flagged'
+    )

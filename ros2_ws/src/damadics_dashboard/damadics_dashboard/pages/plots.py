@@ -1,0 +1,297 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""The plots of a valve, live and in replay: Apache ECharts fed with what is new."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from nicegui import ui
+from numpy.typing import NDArray
+
+from damadics_dashboard.live.traces import NANO, Points, Trace, block_means, envelope
+from damadics_dashboard.pages.elements import box, tell, with_values
+
+BUCKETS = 300  # intervals across a plot: two points each at most
+BLOCK = NANO // 10  # of the signature: means over 0.1 s cancel 50 and 60 Hz hum
+SMALLEST = 1e-5  # 1/s; a logarithmic axis has no zero
+
+
+def time_plot(
+    names: list[str],
+    unit: str,
+    *,
+    log: bool = False,
+    low: float | None = None,
+    high: float | None = None,
+    dashed: tuple[str, ...] = (),
+    bands: tuple[str, ...] = (),
+) -> dict[str, Any]:
+    """
+    Return the options of a plot over time that can be zoomed and moved.
+
+    :param names: of the curves.
+    :param unit: of the ordinate.
+    :param log: logarithmic ordinate.
+    :param low: lower end of the ordinate, free if None.
+    :param high: upper end.
+    :param dashed: curves drawn dashed.
+    :param bands: curves drawn thin, as the edges of a band.
+    :return: ECharts options.
+    """
+    axis: dict[str, Any] = {
+        'type': 'log' if log else 'value',
+        'name': unit,
+        'nameTextStyle': {'align': 'left'},
+        'nameGap': 10,
+        'scale': True,
+        'splitNumber': 4,
+    }
+    if low is not None:
+        axis['min'] = low
+    if high is not None:
+        axis['max'] = high
+        if low is not None:
+            axis['interval'] = (high - low) / 4.0
+    return {
+        'animation': False,
+        'grid': {'left': 54, 'right': 18, 'top': 34, 'bottom': 40},
+        'legend': {'top': 0, 'right': 6, 'itemWidth': 16, 'itemHeight': 8, 'icon': 'roundRect'},
+        'tooltip': {
+            'trigger': 'axis',
+            'axisPointer': {'type': 'line', 'label': {'show': True}},
+            'confine': True,
+        },
+        'axisPointer': {'show': True, 'type': 'line'},
+        'dataZoom': [
+            {
+                'type': 'inside',
+                'filterMode': 'none',
+                'zoomOnMouseWheel': 'ctrl',
+                'moveOnMouseWheel': False,
+                'preventDefaultMouseMove': False,
+            }
+        ],
+        'xAxis': {
+            'type': 'value',
+            'min': 0,
+            'max': 60,
+            'nameLocation': 'end',
+            'nameTextStyle': {'align': 'right', 'verticalAlign': 'top', 'padding': [18, 0, 0, 0]},
+            'nameGap': 0,
+            'axisLabel': {'showMinLabel': False, 'showMaxLabel': False},
+            'splitLine': {'show': False},
+        },
+        'yAxis': {**axis, 'axisPointer': {'show': False}},
+        'series': [
+            {
+                'type': 'line',
+                'name': name,
+                'data': [],
+                'showSymbol': False,
+                'emphasis': {'disabled': True},
+                'lineStyle': {
+                    'width': 1.0 if name in bands else 1.8,
+                    'opacity': 0.5 if name in bands else 1.0,
+                    'type': 'dashed' if name in dashed else 'solid',
+                },
+            }
+            for name in names
+        ],
+    }
+
+
+def signature_plot(names: tuple[str, ...], x: str, y: str) -> dict[str, Any]:
+    """
+    Return the options of the valve signature: force over position.
+
+    :param names: of the clouds, the fainter ones first.
+    :param x: name of the abscissa.
+    :param y: name of the ordinate.
+    :return: ECharts options.
+    """
+    return {
+        'animation': False,
+        'grid': {'left': 54, 'right': 16, 'top': 34, 'bottom': 40},
+        'legend': {'top': 0, 'right': 6, 'itemWidth': 10, 'itemHeight': 10, 'icon': 'circle'},
+        'tooltip': {'trigger': 'item', 'confine': True},
+        'xAxis': {
+            'type': 'value',
+            'name': x,
+            'nameLocation': 'middle',
+            'nameGap': 24,
+            'scale': True,
+            'splitNumber': 5,
+        },
+        'yAxis': {
+            'type': 'value',
+            'name': y,
+            'nameTextStyle': {'align': 'left'},
+            'nameGap': 10,
+            'scale': True,
+            'splitNumber': 5,
+        },
+        'series': [
+            {
+                'type': 'scatter',
+                'name': name,
+                'data': [],
+                'symbolSize': 4,
+                'large': True,
+                'emphasis': {'disabled': True},
+                'itemStyle': {'opacity': opacity},
+            }
+            for name, opacity in zip(names, (0.55, 0.9)[-len(names) :], strict=True)
+        ],
+    }
+
+
+class Plot:
+    """
+    One chart on a page.
+
+    :param options: ECharts options.
+    :param colors: CSS variable of the colour of each curve.
+    :param label: what a screen reader says.
+    :param style: CSS classes.
+    :param group: charts of one name share zoom and cursor.
+    :param empty: shown while there is nothing to plot.
+    """
+
+    def __init__(
+        self,
+        options: dict[str, Any],
+        colors: list[str],
+        label: str,
+        style: str = 'plot',
+        *,
+        group: str = '',
+        empty: str = '',
+    ) -> None:
+        xy = options['series'][0]['type'] == 'scatter'
+        with box('div', 'plot-box'):
+            self.chart = ui.echart(options).classes(style)
+            with_values(self.chart, role='img', aria_label=label)
+            if empty:
+                place = ui.label(empty).classes('plot-empty')
+                with_values(place, data_plot=self.chart.id)
+        tell('register', self.chart.id, {'colors': colors, 'xy': xy, 'group': group})
+
+    @property
+    def id(self) -> int:
+        """Element id on the page."""
+        return self.chart.id
+
+
+@dataclass
+class Curve:
+    """
+    One curve of a plot over time and what of it the browser has already.
+
+    :param trace: where its samples are.
+    :param column: of the trace.
+    :param largest: draw the largest value of each interval only, no smaller than `SMALLEST`.
+    :param scale: factor from the unit of the samples to that of the plot.
+    """
+
+    trace: Trace
+    column: str
+    largest: bool = False
+    scale: float = 1.0
+    sent: int = -1  # start of the last interval sent [ns]
+
+    def points(self, rows: NDArray[Any], width: int) -> Points:
+        """Thin out the samples given."""
+        if self.largest:
+            values = np.maximum(rows[self.column], SMALLEST)
+            return envelope(rows['stamp'], values, width, largest=True)
+        return envelope(rows['stamp'], rows[self.column] * self.scale, width)
+
+
+@dataclass
+class Feed:
+    """
+    Keeps the plots over time of one page up to date.
+
+    :param curves: the curves of each plot.
+    :param window: time shown [s].
+    """
+
+    curves: dict[int, list[Curve]]
+    window: float = 60.0
+    _end: int = field(default=-1, init=False)
+
+    def restart(self) -> None:
+        """Send everything anew."""
+        for curve in (c for curves in self.curves.values() for c in curves):
+            curve.sent = -1
+        self._end = -1
+
+    def news(self) -> dict[int, Any] | None:
+        """
+        Return what `damadics.push` needs.
+
+        :return: None where nothing is new.
+        """
+        end = max(c.trace.newest for curves in self.curves.values() for c in curves)
+        if end == self._end or end < 0:
+            return None
+        if end < self._end:
+            self.restart()
+        self._end = end
+        width = int(self.window * NANO / BUCKETS)
+        first = min(
+            int(c.trace.rows['stamp'][0])
+            for curves in self.curves.values()
+            for c in curves
+            if c.trace.newest >= 0
+        )
+        begin = max(end - int(self.window * NANO), first)
+        last = begin + int(self.window * NANO)
+        message: dict[int, Any] = {}
+        for plot, curves in self.curves.items():
+            everything = any(c.sent < begin for c in curves)
+            series, starts = [], []
+            for curve in curves:
+                start = begin if everything else curve.sent
+                rows = curve.trace.since(start - start % width)
+                points = curve.points(rows, width)
+                if len(rows):
+                    newest = int(rows['stamp'][-1])
+                    curve.sent = newest - newest % width
+                series.append(_rounded(points))
+                starts.append((start - start % width) * 1e-9 - 1e-6)
+            message[plot] = {
+                'all': everything,
+                'from': starts,
+                'series': series,
+                'range': [begin * 1e-9, last * 1e-9],
+            }
+        return message
+
+
+def signature(trace: Trace, seconds: float) -> tuple[Points, Points]:
+    """
+    Return the signature before and now.
+
+    :param trace: of the estimates, with `x`, `u` and `phase`.
+    :param seconds: what counts as now.
+    :return: fault-free reference (the time of learning, or the first that is kept), the latest.
+    """
+    rows = trace.rows
+    if not len(rows):
+        return [], []
+    split = int(np.searchsorted(rows['stamp'], rows['stamp'][-1] - int(seconds * NANO)))
+    before = rows[:split]
+    learning = before[(before['phase'] == 1) | (before['phase'] == 2)]
+    reference = learning if len(learning) else before
+    keep = int(60.0 * NANO)
+    if len(reference):
+        reference = reference[
+            : int(np.searchsorted(reference['stamp'], reference['stamp'][0] + keep))
+        ]
+    return (block_means(reference, 'x', 'u', BLOCK), block_means(rows[split:], 'x', 'u', BLOCK))
+
+
+def _rounded(points: Points) -> Points:
+    return [[round(t, 4), None if v is None else float(f'{v:.5g}')] for t, v in points]

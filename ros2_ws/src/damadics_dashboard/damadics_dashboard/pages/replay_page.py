@@ -1,0 +1,177 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""The page for recordings: drop one, see what the detector makes of it."""
+
+import logging
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from damadics_fd.core.text import COMMENT, NAME, plain
+from nicegui import events, run, ui
+
+from damadics_dashboard.live.valve import NE107
+from damadics_dashboard.live.watcher import Watcher
+from damadics_dashboard.pages.elements import box, markup, tell, with_values
+from damadics_dashboard.pages.frame import card, frame
+from damadics_dashboard.pages.plots import Plot, signature_plot, time_plot
+from damadics_dashboard.pages.valve_words import cause_of, history_rows
+from damadics_dashboard.server.limits import LARGEST_UPLOAD
+from damadics_dashboard.words.texts import Texts
+
+if TYPE_CHECKING:
+    from damadics_dashboard.pages.playback import Playback
+
+MODES = ('monitor', 'paper', 'scada')
+MOST_SHOWN = 20  # recordings of one file
+MOST_ROWS = 500
+KINDS = '.mcap,.csv,.txt,.parquet'
+
+
+def replay_page(watcher: Watcher) -> None:
+    """
+    Draw the page.
+
+    :param watcher: the ROS side.
+    """
+    with frame('replay', '/replay', watcher) as t:
+        with box('div', 'row w-full'):
+            markup('title.html', text=t('replay_title'))
+            box('span', 'spacer')
+            mode = ui.toggle(list(MODES), value=MODES[0]).classes('seg')
+            mode.props('no-caps dense unelevated padding="4px 12px"')
+            with_values(mode, role='group', aria_label=t('mode'))
+        explained = ui.label(t(f'mode_{MODES[0]}')).classes('sub')
+        mode.on_value_change(lambda: explained.set_text(t(f'mode_{mode.value}')))
+        drop = box('div', 'drop w-full')
+        results = box('div', 'stack w-full')
+
+        async def take(event: events.UploadEventArguments) -> None:
+            name = plain(Path(event.file.name).name, NAME) or 'recording.mcap'
+            upload.disable()
+            results.clear()
+            with results:
+                markup('message.html', role='status', title=t('replaying', name=name))
+            try:
+                shown = await _replayed(event, str(mode.value), t)
+            finally:
+                upload.reset()
+                upload.enable()
+            results.clear()
+            with results:
+                if isinstance(shown, str):
+                    title = t('cannot_replay', name=name)
+                    markup('message.html', role='alert', title=title, lines=[shown])
+                    return
+                for playback in shown[:MOST_SHOWN]:
+                    _show(playback, str(mode.value), t)
+                if len(shown) > MOST_SHOWN:
+                    ui.label(t('more_recordings', number=len(shown) - MOST_SHOWN))
+
+        with drop:
+            upload = ui.upload(
+                on_upload=take,
+                auto_upload=True,
+                max_file_size=LARGEST_UPLOAD,
+                label=t('replay_hint'),
+                on_rejected=lambda: ui.notify(t('too_large'), type='negative'),
+            ).props('flat')
+            with_values(upload, accept=KINDS, aria_label=t('recording_to_replay'))
+
+
+async def _replayed(
+    event: events.UploadEventArguments, mode: str, t: Texts
+) -> 'list[Playback] | str':
+    """Replay what was dropped; return why not as a sentence."""
+    # what judges recordings takes seconds to load, which the page does not wait for
+    from damadics_dashboard.pages.playback import play
+
+    suffix = ''.join(c for c in Path(event.file.name).suffix if c.isalnum() or c == '.')[:10]
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, f'recording{suffix or ".mcap"}')
+        try:
+            await event.file.save(path)
+            return await run.io_bound(play, path, mode, plain(event.file.name, NAME))
+        except Exception as problem:  # a recording of somebody else must not hold up the page
+            logging.getLogger(__name__).warning('replay failed: %r', problem)
+            said = plain(str(problem).replace(folder, '').lstrip('/'), COMMENT)
+            return said or t('damaged_recording')
+
+
+def _show(done: 'Playback', mode: str, t: Texts) -> None:
+    """Draw the verdict and the plots of one recording."""
+    alarms = done.alarms
+    worst = max((e.level for e in done.events if alarms), default=0)
+    kind = NE107.get(worst, '') or 'ok'
+    verdict = t('no_alarm_found') if done.monitored else t('never_monitored')
+    if alarms:
+        verdict = t('alarms_found', number=len(alarms), time=t.moment(alarms[0].stamp))
+    elif not done.monitored:
+        kind = 'off'
+    names = (e.cause for e in reversed(done.events) if e.cause not in ('', 'undetermined'))
+    cause = cause_of(next(names, ''), t)
+    facts = (
+        done.name,
+        f'{t("mode")} {mode}',
+        t('sample_count', number=done.samples),
+        t.duration(done.duration),
+        done.truth,
+        t('suspected', cause=cause.words()[0]) if cause is not None and alarms else '',
+    )
+    left_out = [t('left_out', what=plain(p, COMMENT)) for p in done.problems[:5]]
+    detail = ' · '.join(plain(fact, COMMENT) for fact in (*facts, *left_out) if fact)
+    markup('banner.html', kind=kind, title=verdict, detail=detail, figures=[]).classes('w-full')
+    message: dict[int, Any] = {}
+
+    def plot(title: str, curves: dict[str, tuple[str, str]], **options: Any) -> int:
+        with card(t(title)):
+            drawn = Plot(
+                time_plot(list(curves), **options),
+                [color for _, color in curves.values()],
+                t(title),
+                group=f'replay{id(done)}',
+            )
+        series = [done.curves[name] for name, _ in curves.values()]
+        message[drawn.id] = {'all': True, 'series': series, 'from': [], 'range': done.range}
+        return drawn.id
+
+    cv, x1 = t('signal_cv'), t('signal_x1')
+    residual, limit = t('residual'), t('limit')
+    with box('div', 'grid'):
+        with box('div', 'stack'):
+            plot(
+                'position_title',
+                {cv: ('cv', '--cv'), x1: ('x1', '--x1')},
+                unit='1',
+                low=0.0,
+                high=1.0,
+                dashed=(cv,),
+            )
+            judged = plot(
+                'residual_title',
+                {residual: ('residual', '--residual'), limit: ('threshold', '--rho')},
+                unit='1/s',
+                log=True,
+                dashed=(limit,),
+            )
+            plot('velocity_title', {t('velocity'): ('x2', '--velocity')}, unit='1/s')
+        with box('div', 'stack'), card(t('signature_title'), t('signature_remark')):
+            clouds = (t('before_alarm'), t('since_alarm')) if alarms else (t('whole_recording'),)
+            cloud = Plot(
+                signature_plot(clouds, t('signature_x'), t('signature_y')),
+                ['--before', '--now'][-len(clouds) :],
+                t('signature_label'),
+                'plot tall',
+            )
+    message[judged]['areas'] = done.areas()
+    message[cloud.id] = {'all': True, 'series': done.signature, 'from': []}
+    with card(t('history'), classes='w-full'):
+        markup(
+            'history.html',
+            rows=history_rows(done.rows()[:MOST_ROWS], t),
+            empty=t('nothing_happened'),
+            caption=t('alarm_history'),
+            heads=[t(k) for k in ('time', 'class', 'what', 'alarm', 'peak', 'text')],
+            named=False,
+        ).classes('w-full')
+    tell('push', message)

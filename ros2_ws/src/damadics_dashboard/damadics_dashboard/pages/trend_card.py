@@ -1,0 +1,116 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""How a valve has changed over days to years, with its limits."""
+
+import time
+
+import numpy as np
+from damadics_fd.store.intervals import TRENDED, Intervals, Series
+from nicegui import ui
+
+from damadics_dashboard.live.traces import Points
+from damadics_dashboard.live.valve import Valve
+from damadics_dashboard.pages.elements import box, tell, with_values
+from damadics_dashboard.pages.frame import card
+from damadics_dashboard.pages.plots import Plot, time_plot
+from damadics_dashboard.words.outlook import factor_of, outlook_words, unit_of
+from damadics_dashboard.words.texts import Texts
+
+RANGES = (1, 30, 365, 3650)  # days
+DAY = 86400.0
+REFRESH = 60.0  # s
+COLORS = ['--before', '--now', '--before', '--rho', '--rho']
+
+
+class TrendCard:
+    """
+    One quantity over time: mean, least and greatest of each interval, limits, time to limit.
+
+    :param intervals: where the trends are kept.
+    :param valve: the valve.
+    :param t: the words.
+    :param days: time shown at first, from the address.
+    """
+
+    def __init__(self, intervals: Intervals, valve: Valve, t: Texts, days: str) -> None:
+        self._intervals = intervals
+        self._valve = valve
+        self._t = t
+        self._next = 0.0
+        chosen = int(days) if days.isdigit() and int(days) in RANGES else RANGES[1]
+        with card(t('trend_title'), classes='w-full') as head:
+            with head:
+                box('span', 'spacer')
+                names = {name: t(f'trend_{name}') for name in TRENDED}
+                self._quantity = ui.select(names, value='friction', label=t('quantity'))
+                self._quantity.props('dense outlined options-dense').classes('filter')
+                ranges = {n: t(f'days_{n}') for n in RANGES}
+                self._range = ui.toggle(ranges, value=chosen)
+                self._range.props('no-caps dense unelevated padding="4px 12px"').classes('seg')
+                with_values(self._range, role='group', aria_label=t('time_shown'))
+            self._plots = box('div', 'w-full')
+            self._words = ui.label('').classes('trend-words')
+        self._draw_frame()
+        self._quantity.on_value_change(self._changed)
+        self._range.on_value_change(self._changed)
+
+    def update(self) -> None:
+        """Draw anew where a minute is over."""
+        if time.monotonic() >= self._next:
+            self._draw()
+
+    def _changed(self) -> None:
+        tell('remember', 'days', str(self._range.value))
+        self._plots.clear()
+        self._draw_frame()
+        self._draw()
+
+    def _draw_frame(self) -> None:
+        t, quantity = self._t, str(self._quantity.value)
+        curves = [t('least'), t('mean'), t('greatest')]
+        limits = t.causes.limits.get(quantity, ())
+        names = curves + [f'{t("limit")} {n + 1}' for n in range(len(limits))]
+        with self._plots:
+            self._plot = Plot(
+                time_plot(
+                    names,
+                    unit_of(quantity),
+                    bands=(curves[0], curves[2]),
+                    dashed=tuple(names[3:]),
+                ),
+                COLORS[: len(names)],
+                t('trend_label'),
+                empty=t('no_trend_yet'),
+                group='trend',
+            )
+
+    def _draw(self) -> None:
+        self._next = time.monotonic() + REFRESH
+        now, quantity = time.time(), str(self._quantity.value)
+        since = now - DAY * int(self._range.value)
+        found = self._intervals.series(self._valve.name, quantity, since, now)
+        limits = self._t.causes.limits.get(quantity, ())
+        factor = factor_of(quantity)
+        series: list[Points] = [
+            _points(found, values * factor) for values in (found.least, found.mean, found.greatest)
+        ]
+        if len(found.start):
+            span = [float(found.start[0]), float(found.start[-1])]
+            series += [[[at, limit * factor] for at in span] for limit in limits]
+        else:
+            series += [[] for _ in limits]
+        first = float(found.start[0]) if len(found.start) else since
+        shown = [max(since, first - found.length), now]
+        tell('push', {self._plot.id: {'all': True, 'series': series, 'from': [], 'range': shown}})
+        self._words.set_text(outlook_words(quantity, found, limits, now, self._t))
+
+
+def _points(found: Series, values: np.ndarray) -> Points:
+    points: Points = []
+    before = -np.inf
+    for start, value in zip(found.start.tolist(), values.tolist(), strict=True):
+        if start - before > 4.0 * found.length and points:
+            points.append([before + found.length, None])
+        points.append([start + 0.5 * found.length, float(f'{value:.5g}')])
+        before = start
+    return points

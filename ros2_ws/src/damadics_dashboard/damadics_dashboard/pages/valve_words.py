@@ -1,0 +1,239 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""What is said of a valve, its alarm and its history, as plain text in the reader's language."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+from urllib.parse import quote
+
+from damadics_fd.causes import Cause
+from damadics_fd.core.text import SENTENCE, plain
+from damadics_msgs.msg import FaultEvent
+
+from damadics_dashboard.live.valve import NANO, NE107, Alarm, Condition, Valve
+from damadics_dashboard.words.texts import Texts
+
+SHARED = ('', 'none')
+TRANSITIONS = {
+    FaultEvent.RAISED: 'raised',
+    FaultEvent.CLEARED: 'cleared',
+    FaultEvent.ACKNOWLEDGED: 'acknowledged',
+    FaultEvent.RESET: 'reset_done',
+    FaultEvent.SHELVED: 'shelved_done',
+    FaultEvent.UNSHELVED: 'unshelved',
+    FaultEvent.NEAR_MISS: 'near_miss',
+    FaultEvent.CHANGED: 'changed',
+}
+
+
+@dataclass(frozen=True)
+class AlarmWords:
+    """An alarm for a person: what is wrong and how much, what to do, and what stands behind."""
+
+    headline: str
+    advice: str
+    level: str
+    state: str
+    seen: str
+    since: str
+    found: str
+    text: str
+    cells: list[tuple[str, str]]
+
+
+def address(name: str) -> str:
+    """
+    Return the address of a valve's page.
+
+    :param name: name of the valve.
+    :return: path.
+
+    >>> address('area1/lv101'), address('a?b')
+    ('/valve/area1/lv101', '/valve/a%3Fb')
+    """
+    return '/valve/' + quote(name or '~root')
+
+
+def area_of(name: str) -> str:
+    """
+    Return the part of the plant that a valve belongs to.
+
+    :param name: of the valve, with the namespace before it.
+    :return: that namespace, '' for none.
+
+    >>> area_of('unit2/lv101'), area_of('lv101')
+    ('unit2', '')
+    """
+    return name.rpartition('/')[0]
+
+
+def detail_of(condition: Condition, t: Texts) -> str:
+    """
+    Word the detail of a condition.
+
+    :param condition: of a valve.
+    :param t: the words.
+    :return: text.
+    """
+    if math.isnan(condition.value):
+        return t(condition.detail)
+    if condition.detail == 'learned_share':
+        return t('learned_share', share=t.percent(condition.value))
+    return t(condition.detail, time=t.duration(condition.value))
+
+
+def cause_of(name: str, t: Texts) -> Cause | None:
+    """
+    Look up a cause.
+
+    :param name: as an event carries it.
+    :param t: the words.
+    :return: its entry; None where it has none.
+    """
+    return t.causes.causes.get(name) if name not in SHARED else None
+
+
+def headline(event: dict[str, Any], t: Texts) -> tuple[str, str, str]:
+    """
+    Say first what is wrong and how much, and what to do.
+
+    :param event: the evidence of an alarm, as the history keeps it; may be empty.
+    :param t: the words.
+    :return: what is wrong, the numbers of the cause, what to do.
+    """
+    cause = cause_of(event.get('cause') or '', t)
+    if cause is not None:
+        strength = event.get('strength')
+        confidence = event.get('confidence')
+        return cause.words(
+            math.nan if strength is None else strength,
+            math.nan,
+            math.nan if confidence is None else confidence,
+        )
+    ratio = event.get('ratio')
+    if ratio is not None and math.isfinite(ratio) and ratio >= 1.0:
+        return t('deviates', ratio=t.number(ratio, digits=2)), '', t('deviates_advice')
+    return t('deviates_some'), '', t('deviates_advice')
+
+
+def alarm_words(valve: Valve, alarm: Alarm, t: Texts, *, name: bool) -> AlarmWords:
+    """
+    Word an alarm.
+
+    :param valve: the valve.
+    :param alarm: its alarm.
+    :param t: the words.
+    :param name: whether to name the valve.
+    :return: texts.
+    """
+    e = alarm.evidence
+    who = f'{valve.title}: ' if name else ''
+    if alarm.state == 'unknown':
+        what, numbers, advice = t('state_lost'), '', t('state_lost_advice')
+    else:
+        what, numbers, advice = headline(e, t)
+    ratio = e.get('ratio')
+    cells = [
+        (t('alarm_number'), str(alarm.occurrence)),
+        (t('numbers'), numbers or '–'),
+        (t('largest_residual'), of_limit(ratio, t)),
+        (t('residual_now'), t.number(e.get('residual'), '1/s')),
+        (t('limit'), t.number(e.get('threshold'), '1/s')),
+        (t('duration'), t.duration(e.get('duration'))),
+        (t('since'), t.moment(alarm.onset)),
+    ]
+    letter = NE107.get(alarm.level, 'C') or 'M'
+    return AlarmWords(
+        who + what,
+        advice,
+        t(f'ne_{letter}'),
+        t(f'alarm_{alarm.state}'),
+        t('acknowledged' if alarm.acknowledged else 'unacknowledged'),
+        t('since_time', time=t.moment(alarm.onset)) if alarm.onset else '',
+        found_by(e, t),
+        plain(e.get('text') or '', SENTENCE),
+        [cell for cell in cells if cell[1] != '–'],
+    )
+
+
+def found_by(event: dict[str, Any], t: Texts) -> str:
+    """
+    Say who found a fault.
+
+    :param event: the evidence of an alarm; may be empty.
+    :param t: the words.
+    :return: a sentence, '' where nothing is known.
+    """
+    ratio = event.get('ratio')
+    if ratio is None or not math.isfinite(ratio):
+        return ''
+    if ratio < 1.0:
+        return t('found_signature')
+    return t('found_both' if cause_of(event.get('cause') or '', t) else 'found_threshold')
+
+
+def alarm_kind(alarm: Alarm) -> str:
+    """
+    Return the NE 107 letter of an alarm.
+
+    :param alarm: the alarm.
+    :return: F, C, S or M.
+    """
+    return NE107.get(alarm.level, 'C') or 'M'
+
+
+def history_rows(rows: Sequence[dict[str, Any]], t: Texts) -> list[dict[str, Any]]:
+    """
+    Word transitions and actions for a table.
+
+    :param rows: as the history returns them.
+    :param t: the words.
+    :return: what the template shows of each.
+    """
+    return [_row(row, t) for row in rows]
+
+
+def _row(row: dict[str, Any], t: Texts) -> dict[str, Any]:
+    transition = row['transition']
+    what, numbers, advice = '', '', ''
+    if transition in (FaultEvent.RAISED, FaultEvent.CHANGED):
+        what, numbers, advice = headline(row, t)
+    told = plain(row['text'] or '', SENTENCE)
+    return {
+        'moment': t.moment(row['stamp']),
+        'valve': row['valve'] or 'valve',
+        'address': address(row['valve']),
+        'kind': NE107.get(row['level'], '') or 'ok',
+        'what': t(TRANSITIONS[transition]) if transition in TRANSITIONS else '?',
+        'occurrence': row['occurrence'] or '',
+        'ratio': of_limit(row['ratio'], t),
+        'text': f'{what} {numbers}'.strip() or told,
+        'more': f'{advice} {told}'.strip() if what else '',
+    }
+
+
+def of_limit(ratio: float | None, t: Texts) -> str:
+    """
+    Word how large a residual is.
+
+    :param ratio: residual / threshold.
+    :param t: the words.
+    :return: in percent of the limit, or as its multiple.
+    """
+    if ratio is None or not math.isfinite(ratio):
+        return '–'
+    if ratio < 10.0:
+        return t('of_limit', share=f'{100.0 * ratio:.0f}')
+    return t('times_limit', ratio=t.number(ratio))
+
+
+def seconds_of(stamp: int) -> float:
+    """
+    Return a stamp in seconds, as plots take it.
+
+    :param stamp: [ns].
+    :return: [s].
+    """
+    return stamp / NANO

@@ -1,0 +1,242 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""The history: every transition of every valve and everything that people did, over restarts."""
+
+import sqlite3
+import threading
+import time
+from collections import Counter, deque
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from damadics_fd.store.databases import open_database
+
+EVENT = {
+    'valve': 'TEXT',
+    'stamp': 'INTEGER',
+    'seen': 'REAL',
+    'transition': 'INTEGER',
+    'occurrence': 'INTEGER',
+    'level': 'INTEGER',
+    'onset': 'INTEGER',
+    'residual': 'REAL',
+    'threshold': 'REAL',
+    'ratio': 'REAL',
+    'duration': 'REAL',
+    'cause': 'TEXT',
+    'confidence': 'REAL',
+    'strength': 'REAL',
+    'text': 'TEXT',
+    'advice': 'TEXT',
+}
+ACTION = {
+    'valve': 'TEXT',
+    'seen': 'REAL',
+    'action': 'TEXT',
+    'user': 'TEXT',
+    'role': 'TEXT',
+    'comment': 'TEXT',
+    'done': 'INTEGER',
+    'result': 'TEXT',
+}
+COLUMNS, ACTION_COLUMNS = tuple(EVENT), tuple(ACTION)
+INDEXES = (
+    'CREATE INDEX IF NOT EXISTS event_seen ON event (seen)',
+    'CREATE INDEX IF NOT EXISTS event_valve ON event (valve)',
+    'CREATE INDEX IF NOT EXISTS action_seen ON action (seen)',
+)
+IDENTITY = ('valve', 'stamp', 'transition', 'occurrence', 'text')
+ACTION_IDENTITY = ('valve', 'action', 'user', 'comment', 'done')
+MOST_REPEATED = 20_000  # transitions of 200 valves
+MOST_WAITING = 10_000  # rows kept in memory while the file cannot be written
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What to look for in the history; what is left out does not matter."""
+
+    text: str = ''
+    valve: str | None = None
+    transitions: tuple[int, ...] = ()
+    since: float = 0.0  # s, time of arrival
+    until: float = 1e12
+
+
+class History:
+    """
+    Transitions of alarms and actions of people in an SQLite file.
+
+    A file that cannot be read is moved aside and begun anew; what cannot be written waits in
+    memory and is tried again by `retry`. `problem` says so.
+
+    :param path: the file; it is made where it is missing.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._lock = threading.Lock()
+        self._db, self.problem = open_database(path, {'event': EVENT, 'action': ACTION}, INDEXES)
+        self._waiting: deque[tuple[str, Row]] = deque(maxlen=MOST_WAITING)
+        # A detector repeats its last events to a newcomer, such as this page after its restart.
+        self._known = Counter(
+            tuple(row)
+            for row in self._db.execute(
+                f'SELECT {", ".join(IDENTITY)} FROM event ORDER BY rowid DESC LIMIT ?',
+                (MOST_REPEATED,),
+            )
+        )
+        self._known_actions = Counter(
+            tuple(row)
+            for row in self._db.execute(
+                f'SELECT {", ".join(ACTION_IDENTITY)} FROM action ORDER BY rowid DESC LIMIT ?',
+                (MOST_REPEATED,),
+            )
+        )
+
+    def add(self, event: Mapping[str, Any]) -> bool:
+        """
+        Add a transition, unless it repeats one from before this start.
+
+        :param event: values by the names in `COLUMNS`, but for `seen`.
+        :return: whether it is new.
+        """
+        key = tuple(event[name] for name in IDENTITY)
+        if self._known[key]:
+            self._known[key] -= 1
+            return False
+        self._write('event', {**event, 'seen': time.time()})
+        return True
+
+    def add_action(self, action: Mapping[str, Any]) -> bool:
+        """
+        Add what a person did, unless it is known: the node tells what the page asked it for.
+
+        :param action: values by the names in `ACTION_COLUMNS`, but for `seen`.
+        :return: whether it is new.
+        """
+        key = tuple(action[name] for name in ACTION_IDENTITY)
+        if self._known_actions[key]:
+            self._known_actions[key] -= 1
+            return False
+        self._known_actions[key] += 1
+        self._write('action', {**action, 'seen': time.time()})
+        return True
+
+    def retry(self) -> None:
+        """Write what could not be written before."""
+        while self._waiting:
+            table, row = self._waiting[0]
+            if not self._insert(table, row):
+                return
+            self._waiting.popleft()
+        if self.problem.startswith('not written'):
+            self.problem = ''
+
+    def latest(self, valve: str | None = None, count: int = 200) -> list[Row]:
+        """
+        Return the latest transitions, newest first.
+
+        :param valve: of this valve only.
+        :param count: at most so many.
+        :return: rows by the names in `COLUMNS`.
+        """
+        return self.find(Wanted(valve=valve), count)
+
+    def find(self, wanted: Wanted, count: int = 200, offset: int = 0) -> list[Row]:
+        """
+        Return the transitions that are looked for, newest first.
+
+        :param wanted: what they have.
+        :param count: at most so many.
+        :param offset: leave out so many.
+        :return: rows by the names in `COLUMNS`.
+        """
+        where, values = _where(wanted, ('valve', 'text', 'cause', 'advice'))
+        if wanted.transitions:
+            where += f' AND transition IN ({", ".join("?" * len(wanted.transitions))})'
+            values += wanted.transitions
+        return self._select('event', COLUMNS, where, values, count, offset)
+
+    def actions(
+        self, wanted: Wanted | None = None, count: int = 200, offset: int = 0
+    ) -> list[Row]:
+        """
+        Return what people did, newest first.
+
+        :param wanted: what to look for.
+        :param count: at most so many.
+        :param offset: leave out so many.
+        :return: rows by the names in `ACTION_COLUMNS`.
+        """
+        where, values = _where(
+            wanted or Wanted(), ('valve', 'user', 'comment', 'result', 'action')
+        )
+        return self._select('action', ACTION_COLUMNS, where, values, count, offset)
+
+    def valves(self) -> list[str]:
+        """
+        List the valves that have a history.
+
+        :return: names.
+        """
+        with self._lock:
+            rows = self._db.execute('SELECT DISTINCT valve FROM event').fetchall()
+        return sorted(row[0] for row in rows)
+
+    def close(self) -> None:
+        """Close the file."""
+        self.retry()
+        with self._lock:
+            self._db.close()
+
+    def _write(self, table: str, row: Row) -> None:
+        if self._waiting or not self._insert(table, row):
+            self._waiting.append((table, row))
+
+    def _insert(self, table: str, row: Row) -> bool:
+        columns = COLUMNS if table == 'event' else ACTION_COLUMNS
+        marks = ', '.join(f':{name}' for name in columns)
+        try:
+            with self._lock, self._db:
+                self._db.execute(
+                    f'INSERT INTO {table} ({", ".join(columns)}) VALUES ({marks})', row
+                )
+        except sqlite3.Error as problem:
+            self.problem = f'not written, tried again every second: {problem}'
+            return False
+        return True
+
+    def _select(
+        self,
+        table: str,
+        columns: Sequence[str],
+        where: str,
+        values: tuple[Any, ...],
+        count: int,
+        offset: int,
+    ) -> list[Row]:
+        query = (
+            f'SELECT {", ".join(columns)} FROM {table} WHERE {where} '
+            'ORDER BY rowid DESC LIMIT ? OFFSET ?'
+        )
+        try:
+            with self._lock:
+                rows = self._db.execute(query, (*values, count, offset)).fetchall()
+        except sqlite3.Error as problem:
+            self.problem = f'not read: {problem}'
+            return []
+        return [dict(zip(columns, row, strict=True)) for row in rows]
+
+
+def _where(wanted: Wanted, columns: Sequence[str]) -> tuple[str, tuple[Any, ...]]:
+    where, values = 'seen >= ? AND seen < ?', (wanted.since, wanted.until)
+    if wanted.valve is not None:
+        where, values = f'{where} AND valve = ?', (*values, wanted.valve)
+    for word in wanted.text.split():
+        pattern = '%' + word.replace('\\', '\\\\').replace('%', r'\%').replace('_', r'\_') + '%'
+        where += f' AND ({" OR ".join(f"{c} LIKE ? ESCAPE ?" for c in columns)})'
+        for _ in columns:
+            values = (*values, pattern, '\\')
+    return where, values

@@ -1,0 +1,239 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""The page against texts that are markup, a server that is gone, and a fleet that is large."""
+
+import os
+import signal
+import time
+
+import page_site
+import pytest
+import website
+from damadics_fd.ros import qos
+from damadics_msgs.msg import FaultEvent, FaultFlag, Isolation, OperatorAction
+
+sync_api = pytest.importorskip('playwright.sync_api')
+pytestmark = [
+    pytest.mark.ros,
+    pytest.mark.skipif(
+        not website.CHROMIUM.is_file(),
+        reason='no browser: apt-get install chromium for the tests of the page',
+    ),
+]
+EVIL = (
+    'T" innerHTML="<img src=x onerror=window.pwn=1>" onclick="window.pwn=2" x=\''
+    '<img src=x onerror=window.pwn=3><script>window.pwn=4</script>`${window.pwn=5}`{{7*7}}'
+    "');window.pwn=6;//\x1b[31m"
+)
+PAGES = ('/', '/valve/~root', '/valve/hostile/v1', '/history', '/replay', '/valve/none%22%3Ex')
+
+
+@pytest.fixture(scope='module')
+def site(tmp_path_factory):
+    folder = tmp_path_factory.mktemp('hostile')
+    with pytest.MonkeyPatch.context() as patch:
+        site = page_site.Site(folder, patch)
+        yield site
+        site.close()
+
+
+@pytest.fixture(scope='module')
+def browser(site):
+    with website.browser() as chromium:
+        yield chromium
+
+
+@pytest.fixture(scope='module')
+def hostile(site):
+    """Valves whose every text is an attack."""
+    for valve in ('', 'hostile/v1'):
+        site.voices.flag(
+            valve, FaultFlag.STATE_ALARM, EVIL, occurrence=1, level=1, fault=True, residual=0.9
+        )
+        for transition in (FaultEvent.RAISED, FaultEvent.CHANGED):
+            site.voices.event(
+                valve, transition, EVIL, occurrence=1, level=1, ratio=1.8,
+                cause=EVIL, text=f'{transition} {EVIL}', advice=EVIL,
+            )  # fmt: skip
+        action = OperatorAction(user=EVIL, role=EVIL, comment=EVIL, result=EVIL, success=True)
+        prefix = f'/{valve}' if valve else ''
+        site.voices.say(f'{prefix}/operator_action', action, qos.EVENTS)
+        isolation = Isolation(test=EVIL, found_by=EVIL, candidate=[EVIL], text=EVIL)
+        isolation.confidence = [0.9]
+        site.voices.say(f'{prefix}/isolation', isolation)
+    return site
+
+
+def unharmed(page) -> None:
+    """Assert that nothing from outside was run or parsed."""
+    assert page.evaluate('window.pwn') is None
+    assert page.locator('img[src=x]').count() == 0
+    assert page.locator('main [onclick], main [onerror], main script').count() == 0
+
+
+@pytest.mark.parametrize('address', PAGES)
+def test_no_text_from_outside_is_run_or_parsed(hostile, browser, address):
+    page = browser.new_page()
+    foreign = []
+    page.on('request', lambda r: foreign.append(r.url) if hostile.address not in r.url else None)
+    page.goto(hostile.address + address)
+    page.wait_for_timeout(2500)
+    unharmed(page)
+    if address == '/':
+        shown = page.locator('[data-valve=""] .name').inner_text()
+        assert '<img src=x' in shown and '\x1b' not in shown, 'it is shown as the text that it is'
+        page.locator('[data-valve=""]').hover()
+    for button in page.get_by_role('button', name='Acknowledge').all()[:2]:
+        button.click()
+        page.wait_for_timeout(300)
+        page.keyboard.press('Escape')
+    unharmed(page)
+    outside = [u for u in foreign if not u.startswith(('data:', 'blob:', 'ws://127.0.0.1'))]
+    assert outside == [], 'nothing is asked of another machine'
+    page.close()
+
+
+def test_a_name_and_a_comment_of_a_person_are_data_too(hostile, browser):
+    page = browser.new_page()
+    page.goto(f'{hostile.address}/history')
+    page.get_by_label('Comment, on the valve').fill(EVIL)
+    page.get_by_label('Your name').fill(EVIL)
+    page.get_by_role('button', name='Add comment').click()
+    page.wait_for_selector('table.list td >> text=Comment')
+    unharmed(page)
+    page.reload()
+    page.wait_for_timeout(1500)
+    unharmed(page)
+    page.close()
+
+
+def test_the_name_of_a_dropped_file_is_data(hostile, browser, tmp_path):
+    page = browser.new_page()
+    page.goto(f'{hostile.address}/replay')
+    name = '..\\<img src=x onerror=window.pwn=1>".mcap'
+    page.set_input_files(
+        'input[type=file]',
+        files=[{'name': name, 'mimeType': 'x/y', 'buffer': b'\x89MCAP0\r\n' + bytes(99)}],
+    )
+    page.wait_for_selector('[role=alert] >> text=cannot be replayed', timeout=60_000)
+    unharmed(page)
+    assert page.locator('input[type=file]').is_enabled()
+    page.close()
+
+
+@pytest.mark.parametrize('kind', ['html', 'csv', 'pdf'])
+def test_reports_show_texts_as_they_are(hostile, browser, kind):
+    page = browser.new_page()
+    answer = page.request.get(f'{hostile.address}/report?of=hostile%2Fv1&days=1&as={kind}')
+    assert answer.status == 200
+    if kind == 'html':
+        page.goto(f'{hostile.address}/report?of=hostile%2Fv1&days=1&as=html')
+        page.wait_for_timeout(500)
+        unharmed(page)
+        assert page_site.serious(page) == []
+    page.close()
+
+
+def kinds(page) -> list[str]:
+    return page.evaluate(
+        "[...document.querySelectorAll('.tile')].map(t => getComputedStyle(t)"
+        ".getPropertyValue('--tone').trim())"
+    )
+
+
+def test_a_page_whose_server_is_gone_turns_grey_within_two_seconds(site, browser):
+    site.voices.flag('watched', FaultFlag.STATE_HEALTHY, 'LV-1')
+    page = browser.new_page()
+    page.goto(site.address)
+    page.wait_for_selector('[data-valve=watched][data-kind=ok]')
+    page.wait_for_function("document.body.dataset.link === 'good'")
+    assert page.title().startswith('Fleet')
+    grey = page.evaluate("getComputedStyle(document.body).getPropertyValue('--off').trim()")
+    os.kill(site.processes.pid('dashboard'), signal.SIGSTOP)
+    try:
+        stopped = time.monotonic()
+        page.wait_for_function("document.body.dataset.link === 'lost'", polling=20)
+        assert time.monotonic() - stopped < 2.0
+        assert set(kinds(page)) == {grey}
+        assert page.title().startswith('(no connection)')
+        assert 'No connection' in page.locator('#link').inner_text()
+        age = page.locator('[data-valve=watched] [data-age]').inner_text()
+        page.wait_for_timeout(1500)
+        assert page.locator('[data-valve=watched] [data-age]').inner_text() != age
+    finally:
+        os.kill(site.processes.pid('dashboard'), signal.SIGCONT)
+    page.wait_for_function("document.body.dataset.link === 'good'", timeout=60_000)
+    page.close()
+
+
+def test_a_silent_valve_shows_that_and_its_open_alarm(site, browser):
+    site.voices.flag('mute', FaultFlag.STATE_ALARM, 'LV-2', occurrence=1, level=1, fault=True)
+    site.voices.event(
+        'mute', FaultEvent.RAISED, 'LV-2', occurrence=1, level=1, cause='friction_up',
+        strength=1.65, confidence=0.99, ratio=0.73,
+    )  # fmt: skip
+    page = browser.new_page()
+    page.goto(f'{site.address}/valve/mute')
+    page.wait_for_selector('.banner[data-kind=M]')
+    site.voices.silent.add('mute')
+    page.wait_for_selector('.banner[data-kind=off] >> text=Friction is 2.6 times normal')
+    assert page.locator('.alarm >> text=Check the packing').is_visible()
+    page.locator('.behind summary').click()
+    page.wait_for_timeout(1200)
+    assert page.locator('text=Found by the valve signature').is_visible(), 'it stays open'
+    page.close()
+
+
+@pytest.mark.parametrize('scheme', ['light', 'dark'])
+def test_axe_finds_nothing_serious_on_any_page(site, hostile, browser, scheme):
+    page = browser.new_page(color_scheme=scheme)
+    for address in ('/', '/valve/hostile/v1', '/history', '/replay', '/valve/none'):
+        page.goto(site.address + address)
+        page.wait_for_timeout(2000)
+        assert page_site.serious(page) == [], address
+    page.close()
+
+
+def test_german_is_complete_on_the_page(site, browser):
+    context = browser.new_context(locale='de-DE')
+    page = context.new_page()
+    page.goto(f'{site.address}/valve/mute')
+    page.wait_for_selector('text=Die Reibung beträgt das 2,6-Fache des Normalen.')
+    assert page.get_by_role('button', name='Alarm von mute quittieren').is_visible()
+    assert page.evaluate('document.documentElement.lang') == 'de'
+    context.close()
+
+
+def test_a_thousand_valves_are_found_by_search_class_and_area_and_scroll(site, browser):
+    layout, status = page_site.fleet_messages(1000)
+    status.state[123], status.level[123], status.fault[123] = FaultFlag.STATE_ALARM, 4, True
+    site.voices.say('/fleet/layout', layout)
+    for _ in range(3):
+        status.header.stamp = site.voices.node.get_clock().now().to_msg()
+        site.voices.say('/fleet/status', status)
+        time.sleep(0.5)
+    page = browser.new_page(viewport={'width': 1440, 'height': 900})
+    page.goto(site.address)
+    page.wait_for_function("document.querySelectorAll('.tile').length >= 1000", timeout=60_000)
+    page.get_by_role('searchbox').fill('V-0123')
+    page.wait_for_function(
+        "[...document.querySelectorAll('.item')].filter(i => !i.hidden).length === 1"
+    )
+    assert 'q=' not in page.url and 'text=V-0123' in page.url, 'the address tells what is shown'
+    page.get_by_role('searchbox').fill('')
+    page.locator('#area').select_option('Unit 3')
+    page.wait_for_function(
+        "[...document.querySelectorAll('.item')].filter(i => i.offsetParent).length === 100"
+    )
+    page.locator('#area').select_option('')
+    frames = page.evaluate(
+        """new Promise(done => {
+          let frames = 0, begun = performance.now();
+          const step = () => { frames += 1; scrollBy(0, 60);
+            if (performance.now() - begun < 3000) requestAnimationFrame(step);
+            else done(frames / 3); };
+          requestAnimationFrame(step); })"""
+    )
+    print(f'1000 tiles: {frames:.0f} frames a second while scrolling')
+    assert frames > 10.0, 'others may load the machine'
+    page.close()
