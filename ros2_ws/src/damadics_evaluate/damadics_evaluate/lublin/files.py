@@ -9,7 +9,10 @@ from pathlib import Path
 
 import numpy as np
 from damadics_fd.bag.errors import BagError
-from damadics_fd.bag.tables import LUBLIN, TAGS, Table, tag_matches
+from damadics_fd.bag.mapping import Scale
+from damadics_fd.bag.tables.headers import LUBLIN, TAGS, Assignment, Use, tag_matches
+from damadics_fd.bag.tables.sniff import Layout
+from damadics_fd.bag.tables.table import TextTable
 
 from damadics_evaluate.columns import NANOSECONDS, Columns
 
@@ -104,22 +107,26 @@ def read_file(file: Path, on_problem: Callable[[str], None]) -> dict[int, Column
     for actuator in ACTUATORS:
         use = _use(names, TAGS[actuator])
         if {'stamp', 'cv', 'x1'} <= use.keys():
-            table = Table(file, f'A{actuator}', use, delimiter or ' ', header)
+            time, _ = use.pop('stamp')
+            signals = {name: Use(column, scale) for name, (column, scale) in use.items()}
+            layout = Layout('utf-8', delimiter or ' ', (), (), header, ())
+            where = Assignment(signals, (time,), Scale())
+            table = TextTable(file, f'A{actuator}', where, layout)
             chunks = list(table.chunks(on_problem))
             if chunks:
                 found[actuator] = _joined(chunks)
     return found
 
 
-def _use(names: list[str], tags: Mapping[str, tuple[str, float]]) -> dict[str, tuple[int, float]]:
-    """Return which column of a file is which signal, with its factor to SI."""
+def _use(names: list[str], tags: Mapping[str, tuple[str, Scale]]) -> dict[str, tuple[int, Scale]]:
+    """Return which column of a file is which signal, with its scale to SI."""
     use = {}
     for i, name in enumerate(names):
         if name in TIMES:
-            use['stamp'] = i, NANOSECONDS
-        for tag, (signal, factor) in tags.items():
+            use['stamp'] = i, Scale()
+        for tag, (signal, scale) in tags.items():
             if tag_matches(tag, name):
-                use.setdefault(signal, (i, factor))
+                use.setdefault(signal, (i, scale))
     return use
 
 

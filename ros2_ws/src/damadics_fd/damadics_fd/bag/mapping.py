@@ -8,7 +8,7 @@ The same words serve `--map` of the commands and the configuration of gateways.
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TypeVar
 
 import numpy as np
@@ -55,11 +55,13 @@ class Source:
     :param name: `/topic.field`, a column, a tag.
     :param scale: from its numbers to SI.
     :param unit: as written between brackets, '' where there is none.
+    :param told: the user said how the numbers become SI, be it `*1`.
     """
 
     name: str
     scale: Scale = Scale()
     unit: str = ''
+    told: bool = field(default=False, compare=False)
 
 
 Maps = dict[str, Source]  # by signal
@@ -169,7 +171,7 @@ def parse_source(signal: str, text: str) -> Source:
     >>> parse_source('x1', 'POS[%] invert').scale(30.0)
     0.7
     >>> parse_source('t1', 'T[K]'), parse_source('cv', '/sp.data*-0.01+1').scale
-    (Source(name='T', scale=Scale(factor=1.0, offset=-273.15), unit='K'), \
+    (Source(name='T', scale=Scale(factor=1.0, offset=-273.15), unit='K', told=True), \
 Scale(factor=-0.01, offset=1.0))
     """
     match = _SUFFIX.fullmatch(text.strip())
@@ -184,7 +186,8 @@ Scale(factor=-0.01, offset=1.0))
         if signal not in SHARES:
             raise BagError(f'{signal}={text}: only {" and ".join(SHARES)} can be inverted')
         scale = scale.then(Scale(-1.0, 1.0))
-    return Source(name.strip(), scale, match['unit'] or '')
+    told = bool(match['unit'] or factor or offset or match['invert'])
+    return Source(name.strip(), scale, match['unit'] or '', told)
 
 
 def parse_maps(texts: Sequence[str]) -> Maps:

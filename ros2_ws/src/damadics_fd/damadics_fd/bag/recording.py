@@ -17,9 +17,9 @@ from damadics_fd.bag.columns import iter_columns, listing, open_files, read_colu
 from damadics_fd.bag.errors import BagError, NoMeasurementError
 from damadics_fd.bag.mapping import SIGNALS, Source, parse_maps
 from damadics_fd.bag.sources import find_bags
-from damadics_fd.bag.tables import Table, read_table
+from damadics_fd.bag.tables.table import Table, read_table
 
-TABLES = ('.csv', '.txt', '.tsv')
+TABLES = ('.csv', '.txt', '.tsv', '.parquet', '.pq')
 MEASUREMENT = 'damadics_msgs/msg/Measurement'
 __all__ = ['SIGNALS', 'Recording', 'find_recordings', 'parse_maps']
 _ELEMENT = re.compile(r'\[(\d+)\]$')  # of an array

@@ -68,7 +68,7 @@ def as_csv(columns: dict[str, np.ndarray], path: Path, header: str = '') -> Path
     return path
 
 
-def replayed(*args: object) -> list[dict]:
+def replayed(*args: object, code: int = 0) -> list[dict]:
     out = Path(str(args[0])).parent / 'result.json'
-    assert main([*map(str, args), '--mode', 'paper', '--out', str(out), '--jobs', '1']) == 0
+    assert main([*map(str, args), '--mode', 'paper', '--out', str(out), '--jobs', '1']) == code
     return json.loads(out.read_text())

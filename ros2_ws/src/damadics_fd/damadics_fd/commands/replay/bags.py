@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Run a recording through estimator and detector, piece by piece, without ROS."""
 
-import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -16,8 +15,7 @@ from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.recording import Recording
 from damadics_fd.causes import load_causes
 from damadics_fd.commands.replay.flags import FlagWriter
-from damadics_fd.core.decision.alarm import RAISED
-from damadics_fd.core.decision.events import Event
+from damadics_fd.commands.replay.outcome import Outcome, collect
 from damadics_fd.core.monitor import Chain, monitor_for
 from damadics_fd.core.quality import EXPLANATIONS, REMEDIES
 from damadics_fd.core.sample import SIGNALS
@@ -27,76 +25,13 @@ from damadics_fd.core.stamps import SECOND, origin
 from damadics_fd.figures.decimation import Thinner
 from damadics_fd.figures.valve_signature import ForceMap, force_over_position
 
-JUDGEMENT = ('cause', 'confidence', 'strength', 'spread')
+NO_RESULT = 0.9  # share of refused samples from which on nothing was monitored
 NEEDED = {
     'paper': ('cv', 'x1'),
     'scada': ('cv', 'x1', 'p1', 'p2'),
     'monitor': ('cv', 'x1', 'p1', 'p2', 'ps'),
 }
 PIECE = 8192  # rows judged at once: they fit the cache, and calls cost nothing against them
-
-
-@dataclass
-class Outcome:
-    """
-    What became of one recording.
-
-    :param bag: its name.
-    :param mode: mode of estimator and detector.
-    :param samples: measurements read.
-    :param duration_s: from the first to the last stamp [s].
-    :param samples_per_s: over reading, decoding, estimator and detector.
-    :param detections: `t` [s] since scenario zero (since the first sample for real data), `stamp`
-        [ns] and the evidence of each.
-    :param refused: samples that never reached the filters, by reason.
-    :param status: what the estimator did at the end: monitoring, still learning, ...
-    :param problems: damaged places in the file, which were left out.
-    :param error: why it could not be replayed, '' where it was.
-    """
-
-    bag: str
-    mode: str
-    samples: int = 0
-    duration_s: float = 0.0
-    samples_per_s: float = 0.0
-    detections: list[dict[str, Any]] = field(default_factory=list)
-    refused: dict[str, int] = field(default_factory=dict)
-    status: str = ''
-    problems: list[str] = field(default_factory=list)
-    error: str = ''
-
-
-def evidence(event: Event, zero: int) -> dict[str, Any]:
-    """Return a detection with its evidence, fit for JSON."""
-    values = {
-        't': (event.stamp - zero) / SECOND,
-        'stamp': event.stamp,
-        'residual': event.residual,
-        'threshold': event.threshold,
-        'ratio': event.ratio,
-        'level': event.level,
-        'occurrence': event.occurrence,
-        'onset': (event.onset - zero) / SECOND if event.onset else None,
-        'cause': event.cause,
-        'confidence': event.confidence,
-        'strength': event.strength,
-        'spread': event.spread,
-        'text': event.text,
-    }
-    return {
-        name: None if isinstance(value, float) and not math.isfinite(value) else value
-        for name, value in values.items()
-    }
-
-
-def collect(detections: list[dict[str, Any]], events: Iterable[Event], zero: int) -> None:
-    """Add new detections; a cause that becomes known later is put into its detection."""
-    for event in events:
-        if event.transition == RAISED:
-            detections.append(evidence(event, zero))
-        elif event.cause and detections and detections[-1]['occurrence'] == event.occurrence:
-            present = evidence(event, zero)
-            detections[-1] |= {name: present[name] for name in JUDGEMENT}
 
 
 @dataclass(frozen=True)
@@ -189,6 +124,7 @@ def _replay(
         raise BagError('has no measurement: the topic is empty', recording.name)
     outcome.duration_s = (last - first) / SECOND
     outcome.samples_per_s = outcome.samples / spent
+    outcome.lossy = bool(outcome.problems) and not recording.table
     outcome.refused, outcome.status = monitor.refused, monitor.status
     _judge_refused(outcome, lacking)
     if thinner and plan.figures:
@@ -203,7 +139,7 @@ def _replay(
 
 
 def _judge_refused(outcome: Outcome, lacking: set[str]) -> None:
-    """Say why most samples were refused; where all were, there is no result."""
+    """Say why most samples were refused; where nearly all were, there is no result."""
     refused = sum(outcome.refused.values())
     if 2 * refused < outcome.samples:
         return
@@ -216,7 +152,7 @@ def _judge_refused(outcome: Outcome, lacking: set[str]) -> None:
             ' another --mode'
         )
     text = f'{refused} of {outcome.samples} samples were refused ({reason}): {why}'
-    if refused == outcome.samples:
+    if refused >= NO_RESULT * outcome.samples:
         raise BagError(text, outcome.bag)
     outcome.problems.append(f'{outcome.bag}: {text}')
 

@@ -6,16 +6,40 @@ import csv
 import json
 import os
 from collections.abc import Sequence
-from dataclasses import asdict
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
 
-from damadics_fd.commands.replay.bags import Outcome
+from damadics_fd.bag.errors import printable
+from damadics_fd.commands.replay.outcome import FAILED, NONE, Outcome
 
 FORMATS = ('.json', '.csv', '.parquet')
 SHOWN = 8  # detections in the table
-_OF_BAG = ('bag', 'mode', 'samples', 'duration_s', 'samples_per_s')
+COLUMNS = {  # of a row and their types in Parquet
+    'bag': 'string',
+    'mode': 'string',
+    'verdict': 'string',
+    'status': 'string',
+    'samples': 'int64',
+    'duration_s': 'float64',
+    'samples_per_s': 'float64',
+    't': 'float64',
+    'stamp': 'int64',
+    'residual': 'float64',
+    'threshold': 'float64',
+    'ratio': 'float64',
+    'level': 'int64',
+    'occurrence': 'int64',
+    'onset': 'float64',
+    'cause': 'string',
+    'confidence': 'float64',
+    'strength': 'float64',
+    'spread': 'float64',
+    'text': 'string',
+    'refused': 'string',
+    'problems': 'string',
+    'lossy': 'bool',
+    'error': 'string',
+}
 
 
 def print_table(outcomes: Sequence[Outcome]) -> None:
@@ -26,14 +50,15 @@ def print_table(outcomes: Sequence[Outcome]) -> None:
         more = len(outcome.detections) - len(times)
         text = ', '.join(times) + (f', and {more} more' if more else '')
         if not text:
-            text = 'none' if outcome.status == 'monitoring' else f'none: {outcome.status}'
+            text = NONE if outcome.verdict == NONE else f'none: {outcome.status}'
         refused = sum(outcome.refused.values())
+        bag = printable(outcome.bag)
         if outcome.error:
-            rows.append((outcome.bag, outcome.mode, '', '', '', 'failed'))
+            rows.append((bag, outcome.mode, '', '', '', FAILED))
             continue
         rows.append(
             (
-                outcome.bag,
+                bag,
                 outcome.mode,
                 f'{outcome.samples:,}',
                 f'{outcome.duration_s:.1f} s',
@@ -80,10 +105,10 @@ def make_folder(folder: Path) -> None:
 
 def write_outcomes(outcomes: Sequence[Outcome], path: Path) -> None:
     """
-    Write results to a file.
+    Write results to a file, with one content in every format.
 
     JSON is a list with one object per recording. CSV and Parquet have one row per detection, and
-    one with an empty `t` for a recording without.
+    one with an empty `t` for a recording without; `refused` and `problems` are JSON in a cell.
 
     :param outcomes: what became of each recording.
     :param path: file; its suffix chooses the format.
@@ -92,28 +117,28 @@ def write_outcomes(outcomes: Sequence[Outcome], path: Path) -> None:
     check_format(path)
     make_folder(path.parent)
     if path.suffix == '.json':
-        text = json.dumps([asdict(outcome) for outcome in outcomes], indent=1, allow_nan=False)
+        text = json.dumps([outcome.content() for outcome in outcomes], indent=1, allow_nan=False)
         path.write_text(text + '\n', encoding='utf-8')
         return
-    rows = _rows(outcomes)
-    names = list(dict.fromkeys(name for row in rows for name in row))
+    rows = [row for outcome in outcomes for row in _rows(outcome)]
     if path.suffix == '.csv':
         with path.open('w', encoding='utf-8', newline='') as file:
-            writer = csv.DictWriter(file, names, restval='')
+            writer = csv.DictWriter(file, list(COLUMNS), restval='')
             writer.writeheader()
             writer.writerows(rows)
         return
     import pyarrow
     from pyarrow import parquet
 
-    columns = {name: [row.get(name) for row in rows] for name in names}
-    parquet.write_table(pyarrow.table(columns), path)
+    schema = pyarrow.schema([(name, kind) for name, kind in COLUMNS.items()])
+    parquet.write_table(pyarrow.Table.from_pylist(rows, schema=schema), path)
 
 
-def _rows(outcomes: Sequence[Outcome]) -> list[dict[str, Any]]:
-    rows = []
-    for outcome in outcomes:
-        values = asdict(outcome)
-        bag = {name: values[name] for name in _OF_BAG}
-        rows += [bag | detection for detection in outcome.detections or [{'t': None}]]
-    return rows
+def _rows(outcome: Outcome) -> list[dict[str, object]]:
+    """Return a row per detection, or one without."""
+    about = outcome.content() | {
+        'refused': json.dumps(outcome.refused),
+        'problems': json.dumps(outcome.problems, ensure_ascii=False),
+    }
+    del about['detections']
+    return [about | detection for detection in outcome.detections] or [about]

@@ -17,10 +17,12 @@ from typing import Any
 import yaml
 from tqdm import tqdm
 
-from damadics_fd.bag.errors import BagError, NoMeasurementError
+from damadics_fd.bag.errors import BagError, NoMeasurementError, printable
+from damadics_fd.bag.inspection import LOSSY
 from damadics_fd.bag.mcap import loading
 from damadics_fd.bag.recording import Recording, find_recordings, parse_maps
-from damadics_fd.commands.replay.bags import Outcome, Plan, replay, warm_up
+from damadics_fd.commands.replay.bags import Plan, replay, warm_up
+from damadics_fd.commands.replay.outcome import Outcome
 from damadics_fd.commands.replay.output import (
     check_format,
     make_folder,
@@ -41,10 +43,11 @@ EXAMPLES = """examples:
   ros2 run damadics_fd replay valve.mcap --map cv=/pos/setpoint.data*0.01 --map x1=/pos/stem.data
   ros2 run damadics_fd replay bags/dablib_spring.mcap --live --rate 2
 
-exit code: 0 every recording gave a result, 1 one of them failed, 2 wrong command line"""
+exit code: 0 every recording gave a result, 3 something of one is damaged or missing, 1 one of them
+failed, 2 wrong command line"""
 BESIDE = Path()  # bags with the flags go next to the inputs
 WARNINGS = 3  # shown per recording
-_SUFFIX = re.compile(r'(\.mcap(\.zstd)?|\.csv|\.txt|\.tsv)$', re.IGNORECASE)
+_SUFFIX = re.compile(r'(\.(mcap|db3)(\.zstd)?|\.csv|\.txt|\.tsv|\.parquet|\.pq)$', re.IGNORECASE)
 _counter: Any = None  # samples done by all workers
 
 
@@ -85,8 +88,9 @@ def arguments(args: list[str] | None = None) -> argparse.Namespace:
         '--map',
         action='append',
         default=[],
-        metavar='SIGNAL=SOURCE[*FACTOR]',
-        help='where a signal is: /topic.field in a bag, a column in a table',
+        metavar='SIGNAL=SOURCE',
+        help='where a signal is: /topic.field in a bag, a column in a table; then [UNIT], *FACTOR,'
+        ' +OFFSET, invert as needed: x1=POS[%%] invert',
     )
     parser.add_argument(
         '--actuator',
@@ -240,13 +244,14 @@ def main(args: list[str] | None = None) -> int:
     except KeyboardInterrupt:
         print('replay: stopped', file=sys.stderr)
         return 130
-    return report_errors([outcome.error for outcome in outcomes if outcome.error])
+    lossy = LOSSY if any(outcome.lossy for outcome in outcomes) else 0
+    return report_errors([outcome.error for outcome in outcomes if outcome.error]) or lossy
 
 
 def report_problems(problems: Sequence[str]) -> None:
     """Print the first few warnings and how many more there are."""
     for problem in problems[:WARNINGS]:
-        print(f'replay: warning: {problem}', file=sys.stderr)
+        print(f'replay: warning: {printable(problem)}', file=sys.stderr)
     if len(problems) > WARNINGS:
         print(f'replay: and {len(problems) - WARNINGS} more warnings like it', file=sys.stderr)
 

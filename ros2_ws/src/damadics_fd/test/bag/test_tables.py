@@ -1,0 +1,220 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Tables as people have them: spreadsheets, pandas, historians, Parquet."""
+
+import csv
+import json
+from datetime import UTC, datetime
+
+import numpy as np
+import pytest
+from damadics_fd.bag import BagError
+from damadics_fd.bag.mapping import parse_maps
+from damadics_fd.bag.recording import find_recordings
+from damadics_fd.commands.replay.replay import main
+
+N = 50
+CV = np.linspace(0.0, 1.0, N)
+START = int(datetime(2026, 11, 25, 14, tzinfo=UTC).timestamp()) * 10**9
+STAMP = START + np.arange(N) * 5_000_000
+VALUES = {'cv': CV, 'x1': CV / 2, 'ps': 1e5 + 1e5 * CV}
+
+
+def cell(value: float, decimal: str = '.') -> str:
+    return repr(float(value)).replace('.', decimal)
+
+
+def iso(stamp: int, zone: str = '', mark: str = 'T', ahead: int = 0) -> str:
+    seconds, rest = divmod(int(stamp) + ahead * 3600 * 10**9, 10**9)
+    text = datetime.fromtimestamp(seconds, UTC).strftime(f'%Y-%m-%d{mark}%H:%M:%S')
+    return f'{text}.{rest // 1000:06d}{zone}'
+
+
+def rows(head: str, time, delimiter: str = ',', decimal: str = '.', scales=(1.0, 1.0, 1.0)) -> str:
+    lines = [head]
+    for i in range(N):
+        values = [cell(VALUES[n][i] * s, decimal) for n, s in zip(VALUES, scales, strict=True)]
+        lines.append(delimiter.join([time(i), *values]))
+    return '\n'.join(lines) + '\n'
+
+
+def german(i: int) -> str:
+    seconds, rest = divmod(int(STAMP[i]), 10**9)
+    text = datetime.fromtimestamp(seconds, UTC).strftime('%d.%m.%Y %H:%M:%S')
+    return f'{text},{rest // 10**6:03d}'
+
+
+def american(i: int) -> str:
+    seconds, rest = divmod(int(STAMP[i]), 10**9)
+    text = datetime.fromtimestamp(seconds, UTC).strftime('%m/%d/%Y %I:%M:%S')
+    return f'{text}.{rest // 10**6:03d} PM'
+
+
+def pi_historian(i: int) -> str:
+    seconds, rest = divmod(int(STAMP[i]), 10**9)
+    text = datetime.fromtimestamp(seconds, UTC).strftime('%d-%b-%y %H:%M:%S')
+    return f'{text}.{rest // 10**6:03d}'
+
+
+def clock(i: int) -> str:
+    seconds, rest = divmod(int(STAMP[i]), 10**9)
+    return datetime.fromtimestamp(seconds, UTC).strftime('%H:%M:%S') + f'.{rest // 10**6:03d}'
+
+
+PLAIN = 't,cv,x1,ps'
+DATED = {
+    'seconds since 1970': rows('time,cv,x1,ps', lambda i: repr(float(STAMP[i] / 1e9))),
+    'milliseconds since 1970': rows('timestamp,cv,x1,ps', lambda i: str(STAMP[i] // 10**6)),
+    'nanoseconds since 1970': rows('timestamp,cv,x1,ps', lambda i: str(STAMP[i])),
+    'ISO without zone': rows(PLAIN, lambda i: iso(STAMP[i])),
+    'ISO, UTC': rows(PLAIN, lambda i: iso(STAMP[i], 'Z')),
+    'ISO with zone': rows(PLAIN, lambda i: iso(STAMP[i], '+01:00', ahead=1)),
+    'pandas': rows(',cv,x1,ps', lambda i: iso(STAMP[i], '+00:00', ' ')),
+    'BOM': '\ufeff' + rows(PLAIN, lambda i: iso(STAMP[i])),
+    'German spreadsheet': '\ufeff' + rows('Zeit;cv;x1;ps', german, ';', ','),
+    'American spreadsheet': rows('Date Time,cv,x1,ps', american),
+    'historian': rows('Timestamp,cv,x1,ps', pi_historian),
+    'date and time apart': rows('Date,Time,cv,x1,ps', lambda i: f'2026-11-25,{clock(i)}'),
+    'preamble': 'Report: LV-101\nexported;by;me\n\n' + rows('Zeit;cv;x1;ps', german, ';', ','),
+    'preamble with commas': 'LV-101, valve\n' + rows(PLAIN, lambda i: iso(STAMP[i])),
+    'units in the header': rows(
+        'time,cv [%],x1 [%],ps [bar]', lambda i: iso(STAMP[i]), scales=(100, 100, 1e-5)
+    ),
+    'units below the header': rows(
+        'time,cv,x1,ps\n,%,%,kPa', lambda i: iso(STAMP[i]), scales=(100, 100, 1e-3)
+    ),
+    'quoted': rows('"time","cv","x1","ps"', lambda i: f'"{iso(STAMP[i])}"'),
+    'tabs': rows('time\tcv\tx1\tps', lambda i: iso(STAMP[i]), '\t'),
+}
+
+
+def columns_of(path, *maps: str, problems: list | None = None) -> dict[str, np.ndarray]:
+    (recording,) = find_recordings([path], maps=parse_maps(maps))
+    tell = pytest.fail if problems is None else problems.append
+    parts = list(recording.chunks(tell))
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+@pytest.mark.parametrize('kind', DATED)
+def test_tables_as_people_have_them_give_the_same_samples(kind, tmp_path):
+    (tmp_path / 'a.csv').write_text(DATED[kind], encoding='utf-8')
+    columns = columns_of(tmp_path / 'a.csv')
+    assert np.abs(columns['stamp'] - STAMP).max() < 1000  # [ns] what a double holds of a date
+    for name, values in VALUES.items():
+        assert columns[name] == pytest.approx(values, rel=1e-12)
+
+
+@pytest.mark.parametrize('encoding', ['utf-16', 'cp1252', 'utf-8-sig'])
+def test_spreadsheets_of_windows_are_read_in_their_encoding(encoding, tmp_path):
+    text = rows('Zeit;Sollwert für Ventil [%];Stellung °;ps', german, ';', ',')
+    (tmp_path / 'a.csv').write_text(text, encoding=encoding)
+    maps = ('t=Zeit', 'cv=Sollwert für Ventil*1', 'x1=Stellung °')
+    columns = columns_of(tmp_path / 'a.csv', *maps)
+    assert columns['cv'] == pytest.approx(VALUES['cv'])
+    assert columns['x1'] == pytest.approx(VALUES['x1'])
+
+
+@pytest.mark.parametrize(
+    ('head', 'scales', 'maps'),
+    [
+        ('T,SP,POS,P', (100, 100, 1e-5), ['cv=SP[%]', 'x1=POS[%]', 'ps=P[bar]']),
+        ('T,SP [%],POS [%],P [bar]', (100, 100, 1e-5), ['cv=SP', 'x1=POS', 'ps=P']),
+        ('T,SP [%],POS [%],P [bar]', (100, 100, 1e-5), ['cv=SP[%]', 'x1=POS[%]', 'ps=P[bar]']),
+        ('T,SP,POS,P', (16, 1, 1), ['cv=SP*0.0625+0', 'x1=POS', 'ps=P']),
+    ],
+)
+def test_columns_are_mapped_with_units_and_factors(head, scales, maps, tmp_path):
+    text = rows(head, lambda i: str(i * 5), scales=scales)
+    (tmp_path / 'a.csv').write_text(text)
+    columns = columns_of(tmp_path / 'a.csv', 't=T[ms]', *maps)
+    assert columns['stamp'].tolist() == (np.arange(N) * 5_000_000).tolist()
+    for name, values in VALUES.items():
+        assert columns[name] == pytest.approx(values)
+
+
+def test_opening_percent_and_milliamperes_become_closed_shares(tmp_path):
+    lines = ['t,SP,I'] + [f'{i * 0.005},{100 - 100 * CV[i]},{20 - 16 * CV[i]}' for i in range(N)]
+    (tmp_path / 'a.csv').write_text('\n'.join(lines))
+    columns = columns_of(tmp_path / 'a.csv', 'cv=SP[%] invert', 'x1=I[mA] invert')
+    assert columns['cv'] == pytest.approx(CV)
+    assert columns['x1'] == pytest.approx(CV)
+
+
+@pytest.mark.parametrize('time', ['dates', 'zoned', 'seconds', 'stamp', 'text'])
+def test_parquet_is_read_like_csv(time, tmp_path):
+    pyarrow = pytest.importorskip('pyarrow')
+    from pyarrow import parquet
+
+    made = {
+        'dates': lambda: ('time', pyarrow.array(STAMP, pyarrow.timestamp('ns'))),
+        'zoned': lambda: ('when', pyarrow.array(STAMP, pyarrow.timestamp('ns', 'Europe/Berlin'))),
+        'seconds': lambda: ('t', pyarrow.array(STAMP / 1e9)),
+        'stamp': lambda: ('stamp', pyarrow.array(STAMP)),
+        'text': lambda: ('time', pyarrow.array([iso(stamp, 'Z') for stamp in STAMP])),
+    }
+    name, stamps = made[time]()
+    parquet.write_table(pyarrow.table({name: stamps, **VALUES}), tmp_path / 'a.parquet')
+    columns = columns_of(tmp_path / 'a.parquet')
+    assert np.abs(columns['stamp'] - STAMP).max() < 1000
+    assert columns['x1'].tolist() == VALUES['x1'].tolist()
+
+
+@pytest.mark.parametrize(
+    ('name', 'content', 'reason'),
+    [
+        ('a.parquet', b'PAR1 and nonsense', 'cannot be read as Parquet'),
+        ('a.csv', b'\0\1\2\3' * 100, 'it is binary'),
+        ('a.csv', rows(PLAIN, lambda i: '03/04/2026 10:00:00').encode(), 'cannot be told apart'),
+        ('a.csv', rows('t,a,b,c', str).encode(), 'it has the columns t, a, b, c'),
+        ('a.csv', b'\xef\xbb\xbfwhen,cv,x1\nnoon,1,2\n', 'lacks a time'),
+    ],
+)
+def test_what_cannot_be_read_is_told_with_a_remedy(name, content, reason, tmp_path, capsys):
+    (tmp_path / name).write_bytes(content)
+    assert main([str(tmp_path / name), '--mode', 'paper']) == 1
+    assert reason in capsys.readouterr().err
+
+
+def test_a_missing_column_is_named_with_those_there_are(tmp_path):
+    (tmp_path / 'a.csv').write_text('\ufeff' + rows('Zeit,A [%],B,C', str), encoding='utf-8')
+    with pytest.raises(BagError, match=r'there is no such column; there are Zeit, A \[%\], B, C'):
+        columns_of(tmp_path / 'a.csv', 't=Zeit', 'cv=Z', 'x1=B')
+
+
+def test_an_absurd_time_is_left_out_without_a_word_of_numpy(tmp_path):
+    text = rows(PLAIN, lambda i: '1e300' if i == 7 else str(i * 0.005))
+    (tmp_path / 'a.csv').write_text(text)
+    told: list[str] = []
+    assert len(columns_of(tmp_path / 'a.csv', problems=told)['stamp']) == N - 1
+    assert 'have no time' in told[0]
+
+
+def test_results_have_one_content_in_all_formats(tmp_path):
+    parquet = pytest.importorskip('pyarrow.parquet')
+    good = rows(PLAIN, lambda i: str(i * 0.005))
+    (tmp_path / 'in').mkdir()
+    (tmp_path / 'in' / 'learning.csv').write_text(good)
+    (tmp_path / 'in' / 'refused.csv').write_text(rows(PLAIN, lambda i: '5'))
+    for suffix in ('json', 'csv', 'parquet'):
+        code = main(
+            [str(tmp_path / 'in'), '--mode', 'paper', '--out', str(tmp_path / f'r.{suffix}')]
+        )
+        assert code == 1
+    found = {base(r['bag']): r for r in json.loads((tmp_path / 'r.json').read_text())}
+    assert found['refused.csv']['verdict'] == 'failed'
+    assert '49 of 50 samples were refused' in found['refused.csv']['error']
+    table = parquet.read_table(tmp_path / 'r.parquet').to_pylist()
+
+    with (tmp_path / 'r.csv').open() as file:
+        lines = list(csv.DictReader(file))
+    for row in (*table, *lines):
+        whole = found[base(row['bag'])]
+        for name in ('verdict', 'status', 'error', 'mode'):
+            assert row[name] == whole[name]
+        assert json.loads(row['refused']) == whole['refused']
+        assert json.loads(row['problems']) == whole['problems']
+        assert int(row['samples']) == whole['samples']
+
+
+def base(text: str) -> str:
+    return text.rsplit('/', 1)[-1]
