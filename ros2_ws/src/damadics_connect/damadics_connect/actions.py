@@ -16,7 +16,7 @@ from damadics_msgs.srv import (
 )
 from rclpy.node import Node
 
-from damadics_connect.watch import Watch
+from damadics_connect.watch import Watch, namespace_of, topic_of
 
 KINDS = {
     'acknowledge': (Acknowledge, FleetAcknowledge),
@@ -69,13 +69,13 @@ class Actions:
         :return: what was done, or why not.
         """
         single, fleet = KINDS[action]
-        own = f'/{valve}/{action}'
+        own = topic_of(valve, action)
         name, kind = (own, single) if own in self._watch.services else (f'/fleet/{action}', fleet)
         if name not in self._watch.services:
             return Answer(False, f'nobody serves {own}: is the detector running?')
         request = kind.Request(user=plain(user, NAME), comment=plain(comment, COMMENT))
         if kind is fleet:
-            request.valves = [f'/{valve}']
+            request.valves = [namespace_of(valve) or '/']
         if action == 'acknowledge':
             request.occurrence = occurrence
         elif action == 'shelve':

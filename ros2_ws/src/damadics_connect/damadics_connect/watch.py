@@ -28,6 +28,7 @@ LOOK = 0.2  # s between two looks for silence
 SILENT = 2.0  # s without a word after which a valve counts as not monitored
 KEPT = 10_000  # transitions
 FLAG_TYPE = 'damadics_msgs/msg/FaultFlag'
+ROOT = 'root'  # how a valve without a namespace is called
 OnState = Callable[[Judgement], None]
 OnEvent = Callable[[Transition], None]
 
@@ -80,7 +81,8 @@ class Watch:
         """Find new valves by their flags."""
         self.services = {name for name, _ in self._node.get_service_names_and_types()}
         for topic, kinds in self._node.get_topic_names_and_types():
-            valve, _, name = topic.lstrip('/').rpartition('/')
+            namespace, _, name = topic.rpartition('/')
+            valve = namespace.lstrip('/') or ROOT
             new = name == 'fault_flag' and FLAG_TYPE in kinds and valve not in self._met
             if new and self._node.count_publishers(topic):
                 self._meet(valve)
@@ -95,8 +97,12 @@ class Watch:
         def take_event(message: FaultEvent) -> None:
             self._take_event(transition_of(name, message))
 
-        self._node.create_subscription(FaultFlag, f'/{name}/fault_flag', take_flag, qos.FLAG)
-        self._node.create_subscription(FaultEvent, f'/{name}/fault_event', take_event, qos.EVENTS)
+        self._node.create_subscription(
+            FaultFlag, topic_of(name, 'fault_flag'), take_flag, qos.FLAG
+        )
+        self._node.create_subscription(
+            FaultEvent, topic_of(name, 'fault_event'), take_event, qos.EVENTS
+        )
 
     def _take_layout(self, message: FleetLayout) -> None:
         self._layouts[message.version] = message
@@ -110,7 +116,7 @@ class Watch:
         for row, index in enumerate(message.valve):
             if index >= len(layout.valve):
                 continue
-            name = layout.valve[index].lstrip('/')
+            name = layout.valve[index].lstrip('/') or ROOT
             if name in self._met and now - self.valves.get(name, Judgement(name)).heard < SILENT:
                 continue  # its own flag says more
             before = self.valves.get(name, Judgement(name))
@@ -133,7 +139,7 @@ class Watch:
             )
 
     def _take_fleet_event(self, message: FleetEvent) -> None:
-        self._take_event(transition_of(message.valve.lstrip('/'), message.event))
+        self._take_event(transition_of(message.valve.lstrip('/') or ROOT, message.event))
 
     def _take_event(self, event: Transition) -> None:
         if event.key in self._seen:
@@ -159,3 +165,22 @@ class Watch:
         self.valves[judgement.valve] = judgement
         if before is None or before.shown != judgement.shown:
             self._on_state(judgement)
+
+
+def namespace_of(valve: str) -> str:
+    """Return the namespace of a valve: '' or with a leading slash."""
+    return '' if valve == ROOT else f'/{valve}'
+
+
+def topic_of(valve: str, name: str) -> str:
+    """
+    Return a topic or service of a valve.
+
+    :param valve: as `Watch` names it.
+    :param name: within its namespace.
+    :return: the full name.
+
+    >>> topic_of('lv101', 'fault_flag'), topic_of('root', 'fault_flag')
+    ('/lv101/fault_flag', '/fault_flag')
+    """
+    return f'{namespace_of(valve)}/{name}'

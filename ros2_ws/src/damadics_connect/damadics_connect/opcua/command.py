@@ -8,7 +8,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from damadics_fd.ros.arguments import command_parser, split_ros_args
+from damadics_fd.ros.arguments import command_parser, split_ros_args, state_folder
 
 from damadics_connect.process import ConnectError, Graph, run
 from damadics_connect.settings import check, read_config
@@ -51,6 +51,8 @@ async def connect(path: Path, ros_args: list[str]) -> int:
     """
     from damadics_fd.ros.diagnostics import Diagnostics
 
+    from damadics_connect.opcua.cycles import Cycles
+    from damadics_connect.opcua.server import Judgements, read_serve
     from damadics_connect.opcua.session import read_endpoint
     from damadics_connect.opcua.source import Options, Source
     from damadics_connect.opcua.wire import keep_bytes
@@ -66,22 +68,33 @@ async def connect(path: Path, ros_args: list[str]) -> int:
         config.flag('poll'),
     )
     publish = config.text('publish', 'topics', choices=('topics', 'blocks'))
+    serve = read_serve(config)
     if endpoint is not None and not valves:
         config.problems.append('valves: name at least one; opcua --browse URL proposes some')
     check(config, path)
     graph = Graph('opcua', ros_args)
+    log = graph.node.get_logger().info
+    names = [valve.known_as for valve in valves]
     jobs = []
+    cycles = None
     try:
         if endpoint is not None:
             keep_bytes()
-            output = output_of(publish, graph.node, [valve.known_as for valve in valves])
-            source = Source(endpoint, valves, options, output, graph.node.get_logger().info)
+            output = output_of(publish, graph.node, names)
+            if serve is not None:
+                output = cycles = Cycles(output, names, state_folder() / 'cycles.json')
+            source = Source(endpoint, valves, options, output, log)
             Diagnostics(graph.node, 'OPC UA', source.report)
             jobs.append(source.run())
+        if serve is not None:
+            counts = cycles.counts if cycles else {}
+            jobs.append(Judgements(serve, graph.node, counts, log).run())
         graph.start()
         await asyncio.gather(*jobs)
     finally:
         graph.stop()
+        if cycles is not None:
+            cycles.save()
     return 0
 
 

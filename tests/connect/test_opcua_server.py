@@ -1,0 +1,165 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Judgements on our OPC UA server, read by asyncua and by a foreign stack (node-opcua)."""
+
+import asyncio
+import json
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from asyncua import Client, ua
+from connect.detectors import Detectors
+from connect.servers import free_port, listens, wait_for
+from damadics_msgs.msg import FaultEvent
+
+pytestmark = pytest.mark.ros
+OPERATOR, VIEWER = 'operator-0123456789abcdef', 'viewer-0123456789abcdef'
+FOREIGN = Path(__file__).parent / 'foreign'
+PADIM = 'http://opcfoundation.org/UA/PADIM/'
+DI = 'http://opcfoundation.org/UA/DI/'
+ALARM = ua.ObjectIds.AlarmConditionType
+
+
+class Events:
+    """Keeps events of a subscription."""
+
+    def __init__(self) -> None:
+        self.got = []
+
+    def event_notification(self, event) -> None:
+        self.got.append(event)
+
+    async def wait(self, condition, patience: float = 15.0):
+        for _ in range(int(patience / 0.05)):
+            if found := [event for event in self.got if condition(event)]:
+                return found[-1]
+            await asyncio.sleep(0.05)
+        return None
+
+
+@pytest.fixture
+def served(processes, domain, tmp_path):
+    port = free_port()
+    (tmp_path / 'tokens').write_text(f'operator {OPERATOR} Ann Example\nviewer {VIEWER}\n')
+    (tmp_path / 'out.yaml').write_text(
+        f'serve:\n  endpoint: opc.tcp://127.0.0.1:{port}\n  token_file: tokens\n'
+    )
+    with Detectors(domain, 'lv101', 'lv102') as detectors:
+        processes.start('damadics_connect', 'opcua', [str(tmp_path / 'out.yaml')])
+        log = processes.log('opcua')
+        assert wait_for(lambda: listens(port), 40.0), log.read_text()
+        yield f'opc.tcp://127.0.0.1:{port}', detectors, log
+    assert OPERATOR not in log.read_text() and 'Traceback' not in log.read_text()
+
+
+def client_of(url: str, token: str) -> Client:
+    client = Client(url, timeout=10)
+    client.set_user('somebody')
+    client.set_password(token)
+    return client
+
+
+async def value_of(client, path: str, status=ua.StatusCodes.Good):
+    own = await client.get_namespace_index('urn:damadics:fd')
+    for _ in range(200):
+        try:
+            found = await client.get_node(ua.NodeId(path, own)).read_data_value(False)
+            if found.StatusCode.value == status:
+                return found.Value.Value
+        except ua.UaError:
+            pass
+        await asyncio.sleep(0.1)
+    raise AssertionError(f'{path} is not {status}')
+
+
+def test_a_fault_is_a_condition_that_an_operator_acknowledges(served):
+    url, detectors, log = served
+
+    async def watch():
+        async with client_of(url, OPERATOR) as client, client_of(url, VIEWER) as viewer:
+            assert await value_of(client, 'lv101.DeviceHealth') == 0
+            padim, di = [await client.get_namespace_index(uri) for uri in (PADIM, DI)]
+            own = await client.get_namespace_index('urn:damadics:fd')
+            path = ['0:Objects', f'{own}:Valves', f'{own}:LV101', f'{di}:DeviceHealth']
+            health = await client.nodes.root.get_child(path)
+            kind = await (await health.get_parent()).read_type_definition()
+            assert kind == ua.NodeId(1009, padim)
+            events = Events()
+            subscription = await client.create_subscription(100, events)
+            await subscription.subscribe_alarms_and_conditions(evtypes=ALARM)
+            detectors.judge('lv101', FaultEvent.RAISED, 'friction up', cause='friction_up')
+            raised = await events.wait(lambda e: getattr(e, 'ActiveState/Id', False))
+            assert raised is not None, log.read_text()
+            assert raised.Message.Text == 'friction up' and raised.Severity == 700
+            assert raised.Retain and getattr(raised, 'AckedState/Id') is False
+            assert await value_of(client, 'lv101.DeviceHealth') == 3, 'off spec'
+            assert await value_of(client, 'lv101.Ratio') == 2.0
+            assert await value_of(client, 'lv101.Cause') == 'friction_up'
+
+            condition = client.get_node(ua.NodeId('lv101.Alarm', own))
+            method = ua.NodeId(ua.ObjectIds.AcknowledgeableConditionType_Acknowledge)
+            words = ua.LocalizedText('seen')
+            refused = viewer.get_node(condition.nodeid)
+            with pytest.raises(ua.uaerrors.BadUserAccessDenied):
+                await refused.call_method(method, raised.EventId, words)
+            with pytest.raises(ua.uaerrors.BadEventIdUnknown):
+                await condition.call_method(method, b'another', words)
+            await condition.call_method(method, raised.EventId, words)
+            assert detectors.calls[-1] == ('lv101', 'acknowledge', 'Ann Example', 'seen')
+            assert await events.wait(lambda e: getattr(e, 'AckedState/Id', False) and e.Retain)
+            late = Events()
+            again = await viewer.create_subscription(100, late)
+            await again.subscribe_alarms_and_conditions(evtypes=ALARM)
+            refresh = ua.NodeId(ua.ObjectIds.ConditionType_ConditionRefresh)
+            kind = viewer.get_node(ua.ObjectIds.ConditionType)
+            number = ua.Variant(again.subscription_id, ua.VariantType.UInt32)
+            await kind.call_method(refresh, number)
+            assert await late.wait(lambda e: getattr(e, 'ActiveState/Id', False))
+            with pytest.raises(ua.UaError):
+                await health.write_value(ua.Variant(0, ua.VariantType.Int32))
+            detectors.silence()
+            await value_of(client, 'lv101.Residual', ua.StatusCodes.BadNoCommunication)
+            assert await value_of(client, 'lv102.DeviceHealth') == 2, 'check function, not normal'
+
+    asyncio.run(watch())
+
+
+def test_a_wrong_token_does_not_enter(served):
+    url, _, _ = served
+
+    async def enter():
+        async with client_of(url, 'operator-0000000000000000'):
+            pass
+
+    with pytest.raises(ua.UaStatusCodeError):
+        asyncio.run(enter())
+
+
+@pytest.mark.skipif(
+    not shutil.which('node') or not (FOREIGN / 'node_modules').is_dir(),
+    reason='needs Node.js and, once: npm ci --prefix tests/connect/foreign',
+)
+def test_a_foreign_stack_reads_and_hears_the_same(served):
+    url, detectors, log = served
+    assert wait_for(lambda: 'serving judgements' in log.read_text())
+    reader = subprocess.Popen(
+        ['node', str(FOREIGN / 'read.mjs'), url, VIEWER],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    for line in reader.stdout:  # the stack talks, too
+        if line == 'listening\n':
+            break
+    else:
+        pytest.fail(reader.stderr.read())
+    detectors.judge('lv101', FaultEvent.RAISED, 'friction up')
+    out, problem = reader.communicate(timeout=60)
+    assert reader.returncode == 0, problem
+    told = json.loads(out.splitlines()[-1])
+    assert told['browse'] == 'LV101' and told['type'] == 'PADIMType'
+    assert told['event']['message'] == 'friction up'
+    assert told['event']['active'] is True and told['event']['acknowledged'] is False
+    assert told['health'] == 3 and told['ratio'] == 2.0
