@@ -9,8 +9,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import rclpy
+from damadics_fd.core.settings import Settings
 from damadics_fd.ros import qos
+from damadics_fd.store.references import load_reference
 from damadics_msgs.msg import FaultFlag
+from damadics_msgs.srv import Reference
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException
 from rclpy.experimental import EventsExecutor
@@ -87,6 +90,26 @@ class Watcher:
         """Return the number of subscribers of a topic."""
         return self._node.count_subscribers(topic)
 
+    def save_reference(self, reference: Path) -> float:
+        """
+        Let the estimator save what it has learned.
+
+        :param reference: where it does.
+        :return: the time up to which it has learned [s].
+        :raises ProcessError: where it does not save.
+        """
+        client = self._node.create_client(Reference, 'save_reference')
+        if not self.spin_until(client.service_is_ready, PATIENCE):
+            raise ProcessError('the estimator offers no save_reference: look at its log')
+        answer = client.call_async(Reference.Request())
+        self.spin_until(answer.done, PATIENCE)
+        response = answer.result() if answer.done() else None
+        if response is None or not response.success:
+            why = response.message if response else 'no answer'
+            raise ProcessError(f'the estimator did not save what it learned: {why}')
+        kept = load_reference(reference, None, Settings.for_mode('paper'))
+        return kept.last_stamp * 1e-9
+
     def close(self) -> None:
         """Leave the graph."""
         self._executor.shutdown()
@@ -100,14 +123,16 @@ def run(
     *,
     factor: float,
     on_time: Callable[[float], None],
+    reference: Path,
 ) -> Path:
     """
-    Run a scenario live in paper mode and record it.
+    Run a scenario live in paper mode, from what was learned before, and record it.
 
     :param scenario: name of the scenario.
     :param folder: for the bag and the logs; what is there is replaced.
     :param factor: seconds of scenario per second of wall time.
     :param on_time: called with the scenario time [s] while it runs.
+    :param reference: what the estimator begins with; where it does not exist, zero weights.
     :return: the bag.
     :raises ProcessError: where a process fails, or the chain does not come about.
     """
@@ -119,21 +144,10 @@ def run(
         watcher = Watcher(domain, on_time)
         try:
             processes.start('damadics_fd', 'recorder', ['--all', '--out', str(bag)])
-            for name in ('estimator', 'detector'):
-                processes.start('damadics_fd', name, parameters(mode='paper'))
+            _start_estimator(processes, reference)
+            processes.start('damadics_fd', 'detector', parameters(mode='paper'))
             _await_chain(watcher, processes)
-            processes.start(
-                'damadics_plant',
-                'plant',
-                parameters(
-                    scenario=scenario,
-                    rate=400.0,
-                    real_time_factor=factor,
-                    publish_clock=True,
-                    wait_for_subscribers=2,
-                ),
-            )
-            watcher.spin_until(lambda: processes.ended('plant'), PATIENCE + 3600.0)
+            _play(scenario, factor, 2, watcher, processes)
             processes.check()
             watcher.spin_until(lambda: watcher.judged >= watcher.time, WRITING)
             watcher.spin_until(lambda: False, QUIET)
@@ -142,6 +156,70 @@ def run(
         finally:
             watcher.close()
     return bag
+
+
+def learn(
+    scenario: str,
+    folder: Path,
+    *,
+    factor: float,
+    on_time: Callable[[float], None],
+    reference: Path,
+    until: float,
+) -> None:
+    """
+    Let the estimator learn a scenario live in paper mode, and save what it knows at its end.
+
+    :param scenario: name of the scenario.
+    :param folder: for the logs; what is there is replaced.
+    :param factor: seconds of scenario per second of wall time.
+    :param on_time: called with the scenario time [s] while it runs.
+    :param reference: what the estimator begins with, zero weights where it does not exist; what
+        it has learned is saved there.
+    :param until: end of the scenario [s].
+    :raises ProcessError: where a process fails, or not all of the scenario is learned.
+    """
+    shutil.rmtree(folder, ignore_errors=True)
+    domain = free_domain()
+    os.environ.update(surroundings(domain))
+    with Processes(folder / 'logs', surroundings(domain)) as processes:
+        watcher = Watcher(domain, on_time)
+        try:
+            _start_estimator(processes, reference)
+            _play(scenario, factor, 1, watcher, processes)
+            deadline = time.monotonic() + WRITING
+            while watcher.save_reference(reference) < until:
+                processes.check()
+                if time.monotonic() > deadline:
+                    raise ProcessError(f'the estimator has not taken all {until:g} s: see its log')
+                watcher.spin_until(lambda: False, QUIET)
+            processes.end('estimator', WRITING)
+        finally:
+            watcher.close()
+
+
+def _start_estimator(processes: Processes, reference: Path) -> None:
+    kept = {'reference': str(reference.resolve())}
+    processes.start('damadics_fd', 'estimator', parameters(mode='paper', **kept))
+
+
+def _play(
+    scenario: str, factor: float, takers: int, watcher: Watcher, processes: Processes
+) -> None:
+    """Simulate the scenario to its end, once so many take it."""
+    processes.start(
+        'damadics_plant',
+        'plant',
+        parameters(
+            scenario=scenario,
+            rate=400.0,
+            real_time_factor=factor,
+            publish_clock=True,
+            wait_for_subscribers=takers,
+        ),
+    )
+    watcher.spin_until(lambda: processes.ended('plant'), PATIENCE + 3600.0)
+    processes.check()
 
 
 def _await_chain(watcher: Watcher, processes: Processes) -> None:

@@ -7,7 +7,6 @@ import time
 from collections import deque
 from typing import Any
 
-import rclpy
 from builtin_interfaces.msg import Time
 from damadics_fd.bag.cdr.layout import stamped_encoder
 from damadics_fd.core.sample import SIGNALS
@@ -151,18 +150,20 @@ class Plant(Node):
         return response
 
     def _publish(self, count: int) -> None:
+        """Publish the next samples, then the time that they have brought."""
+        stamp = -1
         for _ in range(count):
             if not self._ahead:
                 if self._simulator.finished:
-                    return
+                    break
                 self._simulate(max(count, self._block))
             stamp, fault_state, measurement = self._ahead.popleft()
-            if self._clock_topic:
-                sec, nanosec = divmod(stamp, 1_000_000_000)
-                self._clock_topic.publish(ClockMessage(clock=Time(sec=sec, nanosec=nanosec)))
             self._fault_state.publish(fault_state)
             self._measurement.publish(measurement)
             self._sent += 1
+        if self._clock_topic and stamp >= 0:
+            sec, nanosec = divmod(stamp, 1_000_000_000)
+            self._clock_topic.publish(ClockMessage(clock=Time(sec=sec, nanosec=nanosec)))
 
     def _simulate(self, count: int) -> None:
         """Have the next samples ready, serialised: many at once cost little more than one."""
@@ -173,13 +174,6 @@ class Plant(Node):
             for kind, names in MESSAGES.items()
         ]
         self._ahead.extend(zip(stamp.tolist(), *(map(bytes, row) for row in rows), strict=True))
-
-    def destroy_node(self) -> None:
-        """Let subscribers take the end of a scenario, then go."""
-        if self.finished:
-            for publisher in (self._fault_state, self._measurement):
-                publisher.wait_for_all_acked(rclpy.duration.Duration(seconds=2.0))
-        super().destroy_node()
 
 
 def main(args: list[str] | None = None) -> int:

@@ -11,6 +11,7 @@ from typing import Any, Protocol
 
 import rclpy
 from rclpy.clock import Clock, ClockType
+from rclpy.duration import Duration
 from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.executors import ExternalShutdownException
 from rclpy.experimental import EventsExecutor
@@ -23,6 +24,8 @@ from damadics_fd.ros.clock_step import timers_kept_going
 
 WRONG = (NameValidationException, ParameterException)
 LOOK = 0.1  # s between two looks at whether to end
+FINISHING = 60.0  # s that subscribers may need for the last samples of a node that is done
+LEAVING = 5.0  # s that they may need where a signal ends the process
 LONG = 3600.0  # s; a call costs 30 bytes that rclpy never frees
 
 
@@ -75,6 +78,27 @@ def spin_until(done: Callable[[], bool], executor: EventsExecutor, nodes: Sequen
             nodes[0].destroy_timer(timer)
 
 
+def let_subscribers_take(nodes: Sequence[Any], patience: float) -> bool:
+    """
+    Wait until the reliable subscribers of nodes have what was published: it goes with the nodes.
+
+    :param nodes: that are about to be destroyed.
+    :param patience: time it may take, for all nodes [s].
+    :return: whether all have all.
+    """
+    deadline = time.monotonic() + patience
+    for publisher in [publisher for node in nodes for publisher in node.publishers]:
+        if publisher.get_subscription_count():
+            left = max(deadline - time.monotonic(), 0.001)
+            if not publisher.wait_for_all_acked(Duration(seconds=left)):
+                print(
+                    f'{publisher.topic_name}: left before every subscriber had all',
+                    file=sys.stderr,
+                )
+                return False
+    return True
+
+
 def spin(make_node: Callable[[], SpinnableNode], args: list[str] | None = None) -> int:
     """
     Run one node as a process does.
@@ -123,6 +147,7 @@ def spin_all(makers: Sequence[Callable[[], SpinnableNode]], args: list[str] | No
                 exit_code = max(exit_code, node.exit_code)
                 nodes.remove(node)
                 executor.remove_node(node)
+                let_subscribers_take([node], FINISHING)
                 node.destroy_node()
     except StartError as problem:
         print(problem, file=sys.stderr)
@@ -135,6 +160,7 @@ def spin_all(makers: Sequence[Callable[[], SpinnableNode]], args: list[str] | No
     finally:
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, signal.SIG_IGN)  # it is ending already
+        let_subscribers_take(nodes, LEAVING)
         for node in nodes:
             node.destroy_node()
         rclpy.try_shutdown()
