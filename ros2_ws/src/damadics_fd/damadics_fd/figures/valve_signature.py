@@ -20,6 +20,7 @@ from damadics_fd.core.signature.state import (
     X1,
     V,
 )
+from damadics_fd.core.valve.plug import recoveries
 from damadics_fd.figures.panels import BLUE, GREY, INK, ORANGE, STYLE
 
 Array = NDArray[np.float64]
@@ -63,7 +64,7 @@ class ForceMap:
         if not len(rows):
             return
         _, first, count = np.unique(block, return_index=True, return_counts=True)
-        km = np.interp(rows['x1'], c.plug_x, c.plug_km)
+        km = recoveries(c.plug_km, rows['x1'])
         force = c.weight + c.diaphragm_area * rows['ps'] - rows['dp'] * c.plug_area / km
         columns = np.column_stack([rows['stamp'] * 1e-9, rows['x1'], force, rows['dp']])
         means = np.add.reduceat(columns, first) / count[:, None]
@@ -209,7 +210,7 @@ def _spring_line(signature: Signature, x: Array, dp: Array) -> Array:
     s, c = signature.state[0], signature.settings
     nodes = np.linspace(0.0, 1.0, N_TABLE)
     error = np.interp(x, nodes, np.asarray(s.theta)[TABLE : TABLE + N_TABLE])
-    plug = dp * c.plug_area / np.interp(x, c.plug_x, c.plug_km)
+    plug = dp * c.plug_area / recoveries(c.plug_km, x)
     line: Array = (s.theta[X1] * (x + c.preload) + s.theta[ONE]) * c.force_scale + error * plug
     return line
 

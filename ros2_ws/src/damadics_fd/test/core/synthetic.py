@@ -3,12 +3,9 @@
 """A valve computed backwards: the stem moves as told, its pressure from the force balance."""
 
 import numpy as np
+from damadics_fd.core.valve.plug import RECOVERY, recoveries
 
 KL = 60892.0 * 0.0381
-TABLE = (
-    [0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.99, 1.0],
-    [1.0, 0.95, 0.90, 0.85, 0.785, 0.725, 0.67, 0.61, 0.555, 0.50, 0.45, 0.40],
-)
 
 
 def valve(
@@ -35,7 +32,7 @@ def valve(
     f = friction(t) if callable(friction) else friction
     k = stiffness(t) if callable(stiffness) else stiffness
     p1, p2 = 3.5e6 + 1.75e5 * np.sin(0.2 * np.pi * t), np.full(len(t), 2.6e6)
-    plug = (p1 - p2) * np.pi * 0.05**2 / 4 / np.interp(x, *TABLE)
+    plug = (p1 - p2) * np.pi * 0.05**2 / 4 / recoveries(RECOVERY, x)
     u = k * (x + 0.25) + 750.0 / 30446.0 * v + f * np.tanh(v / 0.002)
     rng = np.random.default_rng(seed)
     return {

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from damadics_fd.core.signature.signature import Signature
 from damadics_fd.core.signature.state import SignatureSettings
+from damadics_fd.core.valve.plug import recoveries
 from damadics_fd.figures import valve_signature
 from damadics_fd.figures.valve_signature import ForceMap, force_over_position
 
@@ -19,7 +20,7 @@ def rows(seconds: float) -> np.ndarray:
     out['x1'] = 0.5 + 0.4 * np.sin(0.4 * t)
     out['dp'] = 9e5
     force = C.force_scale * (out['x1'] + C.preload) + 25.0 * np.sign(np.cos(0.4 * t))
-    plug = out['dp'] * C.plug_area / np.interp(out['x1'], C.plug_x, C.plug_km)
+    plug = out['dp'] * C.plug_area / recoveries(C.plug_km, out['x1'])
     out['ps'] = (force + plug - C.weight) / C.diaphragm_area
     return out
 

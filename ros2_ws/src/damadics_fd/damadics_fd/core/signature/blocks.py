@@ -27,6 +27,7 @@ from damadics_fd.core.signature.state import (
     G,
     V,
 )
+from damadics_fd.core.valve.plug import recovery
 
 SLOPE = 0.015  # [1] the slope of the plug force is taken over +- this part of the stroke
 MPA = 1e6
@@ -41,13 +42,7 @@ def plug_gain(c: Any, x: float) -> float:
     :param x: position / stroke.
     :return: A_plug / (FN Km(x)) in 1/Pa.
     """
-    i = 1
-    while i < c.plug_n - 1 and x > c.plug_x[i]:
-        i += 1
-    share = (x - c.plug_x[i - 1]) / (c.plug_x[i] - c.plug_x[i - 1])
-    share = min(max(share, 0.0), 1.0)
-    km = c.plug_km[i - 1] + share * (c.plug_km[i] - c.plug_km[i - 1])
-    gain: float = c.plug_area / (c.force_scale * km)
+    gain: float = c.plug_area / (c.force_scale * recovery(c.plug_km, x))
     return gain
 
 

@@ -16,6 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damadics_fd.core.settings import Settings
+from damadics_fd.core.valve.parameters import Valve
+from damadics_fd.core.valve.plug import RECOVERY
 
 # -- regressor of one block -----------------------------------------------------------------
 N_TABLE = 11  # nodes 0, 0.1 .. 1 of the correction of the plug force table
@@ -89,7 +91,7 @@ FILL, VENT = 0, 1  # ways of the chamber's air
 STROKES = 5  # strokes each way that show the top rate
 
 MIN_RATE = 40.0  # [Hz] fewer samples make no block mean
-N_PLUG = 16  # capacity of the plug force table
+VALVE = Valve()  # the benchmark's
 
 
 @dataclass(frozen=True)
@@ -101,26 +103,12 @@ class SignatureSettings:
     """
 
     # geometry; defaults: DAMADICS actuator
-    force_scale: float = 60892.0 * 0.0381  # [N] FN = K L
-    preload: float = 0.25  # [1] x1 = X + preload is 0 where the spring is relaxed
-    weight: float = 2.0 * 9.81  # [N] m g
-    diaphragm_area: float = 0.029  # [m2] Ae, negative where the air opens
-    plug_area: float = float(np.pi) * 0.05**2 / 4.0  # [m2] negative where the flow closes
-    plug_x: tuple[float, ...] = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.99, 1.0)
-    plug_km: tuple[float, ...] = (
-        1.0,
-        0.95,
-        0.90,
-        0.85,
-        0.785,
-        0.725,
-        0.67,
-        0.61,
-        0.555,
-        0.5,
-        0.45,
-        0.40,
-    )  # [1] Km(X): plug force (P1 - P2) / Km * plug_area
+    force_scale: float = VALVE.force_scale  # [N] FN = K L
+    preload: float = VALVE.spring_origin  # [1] x1 = X + preload is 0 where the spring is relaxed
+    weight: float = VALVE.mass * VALVE.gravity  # [N] m g
+    diaphragm_area: float = VALVE.signed_area  # [m2] Ae, negative where the air opens
+    plug_area: float = VALVE.signed_plug_area  # [m2] negative where the flow closes
+    plug_km: tuple[float, ...] = RECOVERY  # [1] Km(X): plug force (P1 - P2) / Km * plug_area
     available: bool = True  # False: nothing is done
     sample_period: float = 0.005  # [s] nominal
     # blocks (2.1)
@@ -170,10 +158,10 @@ class SignatureSettings:
     material_friction: float = 0.3
     material_spring: float = 0.02
     # supply pressure from the top speed
-    supply_pressure: float = 600e3  # [Pa]
+    supply_pressure: float = VALVE.supply_pressure  # [Pa]
     material_supply: float = 0.1  # [1] loss of the top filling rate
-    chamber_volume: float = 5.5e-3  # [m3] dead volume V0
-    stroke: float = 0.0381  # [m]
+    chamber_volume: float = VALVE.chamber_volume  # [m3] dead volume V0
+    stroke: float = VALVE.stroke  # [m]
     # NAMUR NE 107 class of each of CAUSES
     ne107: tuple[float, ...] = NO_CLASSES
 
@@ -214,13 +202,8 @@ class SignatureSettings:
 
     def __post_init__(self) -> None:
         """Refuse settings that no valve can have."""
-        if len(self.plug_x) != len(self.plug_km) or not 2 <= len(self.plug_x) <= N_PLUG:
-            raise ValueError(
-                f'plug_x and plug_km must have the same 2 to {N_PLUG} entries, '
-                f'got {len(self.plug_x)} and {len(self.plug_km)}'
-            )
-        if np.any(np.diff(self.plug_x) <= 0.0) or min(self.plug_km) <= 0.0:
-            raise ValueError('plug_x must increase and plug_km must be positive')
+        if len(self.plug_km) != len(RECOVERY) or min(self.plug_km) <= 0.0:
+            raise ValueError(f'plug_km must have {len(RECOVERY)} positive entries')
         if len(self.ne107) != len(CAUSES):
             raise ValueError(f'ne107 must have {len(CAUSES)} classes, got {len(self.ne107)}')
         if self.diaphragm_area == 0.0:
@@ -239,14 +222,9 @@ def _settings_dtype() -> np.dtype:
     spec: list[Any] = [
         ('block_ns', 'i8'),
         ('min_samples', 'i8'),
-        ('plug_n', 'i8'),
-        ('plug_x', 'f8', (N_PLUG,)),
-        ('plug_km', 'f8', (N_PLUG,)),
     ]
     default = SignatureSettings()
     for field in fields(SignatureSettings):
-        if field.name in ('plug_x', 'plug_km'):
-            continue
         value = getattr(default, field.name)
         if isinstance(value, tuple):
             spec.append((field.name, 'f8', (len(value),)))
@@ -267,13 +245,7 @@ def settings_record(settings: SignatureSettings) -> NDArray[np.void]:
     """
     array = np.zeros(1, SETTINGS_DTYPE)
     for field in fields(settings):
-        if field.name not in ('plug_x', 'plug_km'):
-            array[field.name][0] = getattr(settings, field.name)
-    n = len(settings.plug_x)
-    array['plug_n'] = n
-    array['plug_x'][0, :n] = settings.plug_x
-    array['plug_km'][0, :n] = settings.plug_km
-    array['plug_km'][0, n:] = settings.plug_km[-1]
+        array[field.name][0] = getattr(settings, field.name)
     array['block_ns'] = round(settings.block * 1e9)
     expected = settings.block / settings.sample_period
     array['min_samples'] = max(1, int(np.ceil(0.75 * expected - 1e-9)))
