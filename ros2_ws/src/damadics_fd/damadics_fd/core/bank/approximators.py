@@ -40,11 +40,11 @@ class Approximators(Held):
         :return: reason of each row, changed rows, their decisions.
         """
         n = len(valve)
-        before = self.stamps_before(valve)
         reason, changed = np.empty(n, np.uint8), np.empty(n, np.int64)
         decisions = np.empty(n, Decision.dtype())
         count = take_approximator(
             self.quality,
+            self.refused,
             self.states,
             self.detectors,
             self.signatures,
@@ -60,7 +60,6 @@ class Approximators(Held):
             stamp,
             *signals,
         )
-        self.note_refused(reason, valve, stamp, signals, before)
         return reason, changed[:count], decisions[:count]
 
     def estimator(self, v: int) -> Estimator:
@@ -72,7 +71,7 @@ class Approximators(Held):
         """
         part = slice(v, v + 1)
         estimator = Estimator(self.of(v)).hold(self.quality[part], self.states[part])
-        estimator.refused = self.refused.get(v)
+        estimator.refused = self.last_refused(v)
         return estimator
 
     @contextmanager

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 import numpy as np
 
 from damadics_fd.core.bank.held import Held
-from damadics_fd.core.bank.rows import LATER, Reasons, decide, take_control_room
+from damadics_fd.core.bank.rows import LATER, Reasons, decide, note, take_control_room
 from damadics_fd.core.decision.events import Decision
 from damadics_fd.core.modes import PHASE_INIT
 from damadics_fd.core.quality import ACCEPTED
@@ -50,11 +50,11 @@ class ControlRooms(Held):
         :return: reason of each row, changed rows, their decisions.
         """
         n = len(valve)
-        before = self.stamps_before(valve)
         reason, changed = np.empty(n, np.uint8), np.empty(n, np.int64)
         decisions = np.empty(n, Decision.dtype())
         count = take_control_room(
             self.quality,
+            self.refused,
             self.shown,
             self.states,
             self.monitor_records,
@@ -81,13 +81,20 @@ class ControlRooms(Held):
             self._lend(v).run(
                 stamp[row], [s[row] for s in signals], reason[row], self.estimates[v : v + 1]
             )
-            if reason[i] == ACCEPTED and self._decide(v):
+            if reason[i] != ACCEPTED:
+                note(
+                    self.refused[v],
+                    self.quality[v],
+                    int(reason[i]),
+                    int(stamp[i]),
+                    *(float(signal[i]) for signal in signals),
+                )
+            elif self._decide(v):
                 changed[count] = i
                 decisions[count] = self.decisions[v]
                 count += 1
         for v in [v for v, one in self.learning.items() if one.monitor.reference is not None]:
             self._keep(v, self.learning.pop(v))
-        self.note_refused(reason, valve, stamp, signals, before)
         order = np.argsort(changed[:count], kind='stable')
         return reason, changed[:count][order], decisions[:count][order]
 
@@ -112,7 +119,7 @@ class ControlRooms(Held):
         :return: it works on the records here.
         """
         estimator = self._lend(v)
-        estimator.refused = self.refused.get(v)
+        estimator.refused = self.last_refused(v)
         return estimator
 
     @contextmanager

@@ -8,12 +8,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from damadics_fd.core.approximator.state import Estimate
-from damadics_fd.core.bank.rows import Reasons
+from damadics_fd.core.bank.rows import LastRefused
 from damadics_fd.core.decision.detector import Detector
 from damadics_fd.core.decision.events import Decision
 from damadics_fd.core.intake import Intake
 from damadics_fd.core.quality import ACCEPTED, Quality, Refused
-from damadics_fd.core.record import Array, Floats, Ints, stacked
+from damadics_fd.core.record import Array, stacked
 from damadics_fd.core.settings import Settings
 
 MARK = 16  # bytes of the digest that a state begins with
@@ -41,7 +41,7 @@ class Held:
         self.signatures = np.repeat(firsts[0].signature.state, count)
         self.estimates = Estimate.rows(count)
         self.decisions = Decision.rows(count)
-        self.refused: dict[int, Refused] = {}
+        self.refused = LastRefused.rows(count)
 
     def of(self, v: int) -> Settings:
         """
@@ -64,38 +64,19 @@ class Held:
             self.detectors[part], self.signatures[part], self.estimates[part], self.decisions[part]
         )
 
-    def stamps_before(self, valve: Ints) -> Ints:
+    def last_refused(self, v: int) -> Refused | None:
         """
-        Return the last accepted stamp of the valve of each row, before the rows.
+        Return why the last refused sample of a valve was refused.
 
-        :param valve: of each row.
-        :return: stamps [ns].
+        :param v: which.
+        :return: None where none was.
         """
-        stamps: Ints = self.quality['stamp'][valve]
-        return stamps
-
-    def note_refused(
-        self,
-        reason: Reasons,
-        valve: Ints,
-        stamp: Ints,
-        signals: Sequence[Floats],
-        before: Ints,
-    ) -> None:
-        """
-        Remember the last refused sample of each valve.
-
-        :param reason: of each row; the following are columns of the rows too.
-        :param before: as `stamps_before` returns it.
-        """
-        refused = np.flatnonzero(reason)
-        for i in {int(valve[i]): i for i in refused}.values():  # the last row of each valve
-            v = int(valve[i])
-            earlier = np.flatnonzero((valve[:i] == v) & (reason[:i] == ACCEPTED))
-            last = int(stamp[earlier[-1]]) if len(earlier) else int(before[i])
-            intake = Intake(self.of(v))
-            values = [float(signal[i]) for signal in signals]
-            self.refused[v] = intake.note(int(reason[i]), int(stamp[i]), values, last)
+        row = self.refused[v]
+        if row.reason == ACCEPTED:
+            return None
+        return Intake(self.of(v)).note(
+            int(row.reason), int(row.stamp), row['values'].tolist(), int(row.before)
+        )
 
     def state_arrays(self) -> list[Array]:
         """
@@ -103,7 +84,14 @@ class Held:
 
         :return: what `tobytes` tells.
         """
-        return [self.quality, self.detectors, self.signatures, self.estimates, self.decisions]
+        return [
+            self.quality,
+            self.refused,
+            self.detectors,
+            self.signatures,
+            self.estimates,
+            self.decisions,
+        ]
 
     def records_size(self) -> int:
         """
@@ -140,7 +128,6 @@ class Held:
             size = array.dtype.itemsize
             array[v : v + 1].view(np.uint8)[:] = np.frombuffer(state, np.uint8, size, at)
             at += size
-        self.refused.pop(v, None)
 
     def _mark(self) -> bytes:
         layouts = '\n'.join(str(array.dtype.descr) for array in self.state_arrays())

@@ -6,6 +6,8 @@ The loops over rows {valve, stamp, seven signals} of many valves, compiled.
 Compiled code has no bounds check: `Bank.take` checks the rows first.
 """
 
+from typing import Annotated
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,12 +16,56 @@ from damadics_fd.core.approximator.state import Estimate, State
 from damadics_fd.core.decision import judge
 from damadics_fd.core.jit import jit
 from damadics_fd.core.quality import ACCEPTED, Quality
-from damadics_fd.core.record import Array, Floats, Ints, Rows
+from damadics_fd.core.record import Array, Floats, Ints, Record, Rows
+from damadics_fd.core.sample import SIGNALS
 from damadics_fd.core.scada import kernel
 from damadics_fd.core.settings import Settings
 
 LATER = 255  # instead of a reason: the valve is still learned in mode scada, which is not compiled
 Reasons = NDArray[np.uint8]
+
+
+class LastRefused(Record):
+    """Remember the sample of a valve that was refused last."""
+
+    reason: int  # ACCEPTED where there was none
+    stamp: int
+    before: int  # stamp of the last accepted sample before it
+    values: Annotated[Floats, len(SIGNALS)]
+
+
+@jit
+def note(
+    r: LastRefused,
+    q: Quality,
+    reason: int,
+    stamp: int,
+    cv: float,
+    x1: float,
+    p1: float,
+    p2: float,
+    t1: float,
+    flow: float,
+    ps: float,
+) -> None:
+    """
+    Remember a refused sample.
+
+    :param r: written.
+    :param q: quality record of its valve.
+    :param reason: why.
+    :param stamp: of the sample [ns]; its signals follow.
+    """
+    r.reason = reason
+    r.stamp = stamp
+    r.before = q.stamp
+    r.values[0] = cv
+    r.values[1] = x1
+    r.values[2] = p1
+    r.values[3] = p2
+    r.values[4] = t1
+    r.values[5] = flow
+    r.values[6] = ps
 
 
 @jit
@@ -58,6 +104,7 @@ def decide(
 @jit
 def take_approximator(
     q: Rows[Quality],
+    r: Rows[LastRefused],
     s: Rows[State],
     ds: Rows[judge.State],
     g: Array,
@@ -83,6 +130,7 @@ def take_approximator(
     Take rows of valves in the modes paper and monitor.
 
     :param q: quality states; these and the following hold a record per valve.
+    :param r: the samples refused last.
     :param s: estimator states.
     :param ds: detector states.
     :param g: states of the signature.
@@ -116,7 +164,11 @@ def take_approximator(
             flow[i],
             ps[i],
         )
-        if reason[i] == ACCEPTED and decide(ds, g, e, d, v, c[w], gc, w):
+        if reason[i] != ACCEPTED:
+            note(
+                r[v], q[v], reason[i], stamp[i], cv[i], x1[i], p1[i], p2[i], t1[i], flow[i], ps[i]
+            )
+        elif decide(ds, g, e, d, v, c[w], gc, w):
             changed[count] = i
             decisions[count] = d[v]
             count += 1
@@ -126,6 +178,7 @@ def take_approximator(
 @jit
 def take_control_room(
     q: Rows[Quality],
+    r: Rows[LastRefused],
     a: Rows[kernel.Shown],
     states: Array,
     settings: Array,
@@ -192,7 +245,11 @@ def take_control_room(
             flow[i],
             ps[i],
         )
-        if reason[i] == ACCEPTED and decide(ds, g, e, d, v, c[w], gc, w):
+        if reason[i] != ACCEPTED:
+            note(
+                r[v], q[v], reason[i], stamp[i], cv[i], x1[i], p1[i], p2[i], t1[i], flow[i], ps[i]
+            )
+        elif decide(ds, g, e, d, v, c[w], gc, w):
             changed[count] = i
             decisions[count] = d[v]
             count += 1
