@@ -37,7 +37,7 @@ setup(
             'replay = damadics_fd.commands.replay.replay:main',
             'verify = damadics_fd.commands.verify:main',
             'recover = damadics_fd.commands.recover:main',
-            'commission = damadics_fd.commands.commission:main',
+            'commission = damadics_fd.commands.commission.command:main',
         ],
     },
 )

@@ -4,8 +4,11 @@
 
 import math
 
+import numpy as np
+
 from damadics_fd.core.approximator.state import Transmitter
 from damadics_fd.core.jit import jit
+from damadics_fd.core.record import Floats
 from damadics_fd.core.settings import Settings
 
 
@@ -32,3 +35,21 @@ def delay(
     s.late_p1 += share * (p1 - s.late_p1)
     s.late_p2 += share * (p2 - s.late_p2)
     return s.late_x1, s.late_p1, s.late_p2
+
+
+@jit
+def delay_column(values: Floats, steps: Floats, lag: float) -> Floats:
+    """
+    Pass a column through the first-order lag, as `delay` does sample by sample.
+
+    :param values: of one signal.
+    :param steps: time since the sample before [s]; infinite where the lag starts afresh.
+    :param lag: [s].
+    :return: the delayed column.
+    """
+    late = np.empty(len(values))
+    held = values[0]
+    for i in range(len(values)):
+        held += -math.expm1(-steps[i] / lag) * (values[i] - held)
+        late[i] = held
+    return late

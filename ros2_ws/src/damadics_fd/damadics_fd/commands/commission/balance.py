@@ -1,0 +1,339 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""
+The force balance of the moving stem: spring, friction, and the plug force that no sheet knows.
+
+air Ae Ps + m g = K L (X + origin) + c L v + (Fc + Fs e^-(v/vs)^2) sgn v + flow (1 + e(X)) Fvc
+"""
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+import numpy as np
+
+from damadics_fd.commands.commission.errors import CommissioningError
+from damadics_fd.commands.commission.lag import (
+    SIGN_GAIN,
+    STRIBECK,
+    WIDTH,
+    Lag,
+    find_lag,
+    plug_per_pascal,
+    trust,
+)
+from damadics_fd.commands.commission.signals import Blocks, Signals, blocks
+from damadics_fd.core.record import Floats
+from damadics_fd.core.settings import Settings
+
+BLOCK = 0.1  # s
+LEAST = 20  # moving blocks each way
+MODEL_ERROR = 1e-3  # of the spring force over the stroke: the balance is no better than that
+WIDE, NARROW = (0.5, 0.2), (0.05, 0.03)  # prior of the plug force: in common, per node
+VISCOUS_STD = 0.3  # how well a data sheet's viscous friction is known, as a share
+MILD, DRY_SHARE = 0.15, 0.3  # a viscous share of friction at the usual speed, and its deviation
+TABLE_X = np.r_[0.0:0.91:0.1, 0.99, 1.0]
+LOWEST, HIGHEST = 0.01, 10.0  # entries of plug_table
+NO_SPRING = 10.0  # strokes of preload that no spring has
+K, ONE, V, S, SLOW, LATE, TABLE = range(7)
+
+
+@dataclass(frozen=True)
+class Balance:
+    """Hold the fit; forces in N, the axis of time that of the blocks used."""
+
+    settings: Settings  # with stiffness, preload, directions, plug force and lag of the valve
+    lag: Lag
+    viscous: float  # c [N s/m]
+    friction: float  # dry, Fc [N]
+    stribeck: float  # how much more at rest [N]
+    covariance: Floats  # of K, b, c, Fc
+    misfit: float  # standard deviation of the force left over [N]
+    noise: float  # the part of it that sensors explain [N]
+    gain: float  # plug force / that of the data sheet, mean over the stroke
+    shape: float  # how far it departs from that
+    t: Floats
+    x: Floats
+    v: Floats
+    force: Floats  # without the plug force [N]
+    fitted: Floats
+    columns: Floats  # of K, b, c, Fc: shape (n, 4)
+    watched: float  # s of good blocks, moving or not
+    undetermined: tuple[str, ...]
+
+    @property
+    def stiffness_std(self) -> float:
+        """Standard deviation of the stiffness [N/m]."""
+        return float(np.sqrt(self.covariance[K, K]))
+
+    @property
+    def friction_std(self) -> float:
+        """Standard deviation of the dry friction [N], the lag's part included."""
+        return float(np.sqrt(self.covariance[S, S]))
+
+    @property
+    def viscous_std(self) -> float:
+        """Standard deviation of the viscous friction [N s/m], the lag's part included."""
+        lagged = self.settings.stiffness * self.lag.std
+        return float(np.hypot(np.sqrt(self.covariance[V, V]), lagged))
+
+    @property
+    def total(self) -> float:
+        """Dry and viscous friction at the usual speed [N]."""
+        v = self.settings.stroke * float(np.median(np.abs(self.v)))
+        return self.friction + self.viscous * v
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Hold one least-squares fit."""
+
+    theta: Floats
+    covariance: Floats
+    sigma: float
+    objective: float
+    left: Floats
+
+
+def find_balance(signals: Signals, sheet: Settings, given: Collection[str] = ()) -> Balance:
+    """
+    Identify directions, lag, plug force, spring and friction.
+
+    :param signals: good samples of a fault-free valve.
+    :param sheet: settings with what the data sheet says.
+    :param given: names of the settings that the user stated.
+    :return: the balance.
+    :raises CommissioningError: where the stem moves too little, or the fit is no valve.
+    """
+    fine = blocks(signals, WIDTH)
+    lag = find_lag(fine, sheet)
+    s, undetermined = _directed(sheet, lag, given)
+    balance = None
+    for _ in range(2):  # a better plug force tells the lag better, and the reverse
+        s = s.replace(ps_lag=float(f'{lag.seconds:.3g}'))
+        b = blocks(signals, BLOCK, s.ps_lag)
+        use = _enough(b)
+        s, gain, shape = _plug(b, use, s, sheet, given)
+        balance = _final(b, use, s, lag, gain, shape, sheet, given, undetermined)
+        again = find_lag(fine, s)
+        if abs(again.seconds - lag.seconds) < 0.003:
+            break
+        lag = again
+    assert balance is not None
+    return balance
+
+
+def _directed(sheet: Settings, lag: Lag, given: Collection[str]) -> tuple[Settings, list[str]]:
+    undetermined = []
+    air, flow = ('close' if lag.air > 0.0 else 'open'), ('open' if lag.flow > 0.0 else 'close')
+    if lag.air_gain < SIGN_GAIN:
+        undetermined.append('air_to')
+        air = sheet.air_to
+    elif 'air_to' in given and air != sheet.air_to:
+        raise CommissioningError(
+            f'the pressure works as if air_to were {air}, not {sheet.air_to} as stated: x1 is '
+            'inverted (1 must mean closed), or air_to is stated wrongly'
+        )
+    if lag.flow_gain < SIGN_GAIN or 'flow_to' in given:
+        if 'flow_to' not in given and sheet.plug_diameter > 0.0:
+            undetermined.append('flow_to')
+        flow = sheet.flow_to
+    return sheet.replace(air_to=air, flow_to=flow), undetermined
+
+
+def _enough(b: Blocks) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    use = b.moving
+    up, down = int(np.sum(use & (b.v > 0.0))), int(np.sum(use & (b.v < 0.0)))
+    if min(up, down) < LEAST:
+        whole = len(b.t) * b.width
+        raise CommissioningError(
+            f'{up * BLOCK:.1f} s of steady closing and {down * BLOCK:.1f} s of opening in '
+            f'mid-stroke among {whole:.0f} s of good data, {LEAST * BLOCK:g} s of each are '
+            'needed: move it both ways'
+        )
+    return use
+
+
+def regressor(b: Blocks, s: Settings) -> tuple[Floats, Floats, Floats]:
+    """
+    Return what the balance of blocks is made of.
+
+    :param b: blocks.
+    :param s: settings.
+    :return: force with the plug force of the settings taken off [N]; columns of K, b, c, Fc,
+        Stribeck friction and lag of P1 - P2, shape (n, 6); hat functions times plug force.
+    """
+    air = 1.0 if s.air_to == 'close' else -1.0
+    flow = 1.0 if s.flow_to == 'open' else -1.0
+    gain = flow * plug_per_pascal(s, b.x)
+    plug = gain * b.dp
+    v = np.nan_to_num(b.v)
+    sign = np.sign(v)
+    columns = np.stack(
+        [
+            s.stroke * b.x,
+            np.ones(len(v)),
+            s.stroke * v,
+            sign,
+            sign * np.exp(-((v / STRIBECK) ** 2)),
+            gain * b.rate_dp,
+        ],
+        axis=1,
+    )
+    hats = np.clip(1.0 - np.abs(b.x[:, None] * 10.0 - np.arange(11)), 0.0, 1.0)
+    force = s.mass * s.gravity + air * s.area * b.ps - plug
+    return force, columns, plug[:, None] * hats
+
+
+def solve(
+    A: Floats, y: Floats, precision: Floats, mean: Floats, floor: float, weights: Floats
+) -> Fit:
+    """
+    Fit by least squares with a prior; outliers count less.
+
+    :param A: columns, shape (n, p).
+    :param y: [N], shape (n,).
+    :param precision: inverse covariance of the prior, shape (p, p).
+    :param mean: of the prior, shape (p,).
+    :param floor: least standard deviation of the noise [N].
+    :param weights: weight of each row, shape (n,).
+    :return: the fit.
+    """
+    sigma, weight = max(float(np.std(y)), floor), weights
+    theta, H, left = mean, precision, y
+    for _ in range(6):
+        H = (A * weight[:, None]).T @ A / sigma**2 + precision
+        theta = np.linalg.solve(H, (A * weight[:, None]).T @ y / sigma**2 + precision @ mean)
+        left = y - A @ theta
+        spread = max(1.4826 * float(np.median(np.abs(left[weights > 0.3 * weights.max()]))), floor)
+        weight = weights * np.minimum(1.0, 3.0 * spread / np.maximum(np.abs(left), 1e-12))
+        sigma = max(float(np.sqrt(np.sum(weight * left**2) / np.sum(weight))), floor)
+    change = theta - mean
+    objective = float(np.sum(weight * left**2)) / sigma**2 + float(change @ precision @ change)
+    objective += 2.0 * len(y) * float(np.log(sigma))
+    return Fit(theta, np.linalg.inv(H), sigma, objective, left)
+
+
+def _prior(sheet: Settings, given: Collection[str], size: int) -> tuple[Floats, Floats]:
+    """Return precision and mean: weak for spring and dry friction, mild for the viscous one."""
+    KL = sheet.stiffness * sheet.stroke
+    std = np.array([1e3 * sheet.stiffness, 1e3 * KL, 1e9, 1e9, 0.02 * KL, 0.05])
+    mean = np.zeros(size)
+    if 'alpha1' in given:
+        mean[V] = sheet.alpha1 * sheet.mass
+        std[V] = VISCOUS_STD * max(mean[V], 1.0)
+    precision = np.zeros((size, size))
+    precision[:6, :6] = np.diag(1.0 / std**2)
+    return precision, mean
+
+
+def _plug(
+    b: Blocks, use: Floats, s: Settings, sheet: Settings, given: Collection[str]
+) -> tuple[Settings, float, float]:
+    """Fit the plug force table; return settings, gain and departure of the shape."""
+    if s.plug_diameter <= 0.0:
+        return s, 1.0, 0.0
+    base = s.replace(plug_table=sheet.plug_table, plug_diameter=sheet.plug_diameter)
+    rows, common, per_node = base, *WIDE
+    e_total = np.ones(11)
+    for _ in range(3):
+        force, columns, hats = regressor(b, rows)
+        A = np.concatenate([columns, hats], axis=1)[use]
+        precision, mean = _prior(sheet, given, A.shape[1])
+        table = np.full((11, 11), common**2) + np.eye(11) * per_node**2
+        precision[TABLE:, TABLE:] = np.linalg.inv(table)
+        _viscous_prior(precision, mean, A, force[use], b.v[use], given)
+        floor = MODEL_ERROR * s.stiffness * s.stroke
+        fit = solve(A, force[use], precision, mean, floor, trust(b.v[use]))
+        e_total = np.maximum(e_total * (1.0 + fit.theta[TABLE:]), 0.003)
+        rows = _with_table(base, e_total)
+        common, per_node = NARROW
+    seen = np.histogram(b.x[use], np.linspace(-0.05, 1.05, 12))[0] > 0
+    gain = float(np.mean(e_total[seen]))
+    return rows, gain, float(np.std(e_total[seen] / gain))
+
+
+def _viscous_prior(
+    precision: Floats, mean: Floats, A: Floats, y: Floats, v: Floats, given: Collection[str]
+) -> None:
+    """Lean, where one speed cannot tell dry from viscous friction, on a mild viscous share."""
+    if 'alpha1' in given:
+        return
+    few = np.delete(A, [V, SLOW], axis=1)
+    theta = np.linalg.lstsq(few, y, rcond=None)[0]
+    speed = float(np.median(np.abs(A[:, V])))
+    total = abs(float(theta[S - 1])) + 1e-9  # the column of Fc has moved up by one
+    mean[V] = MILD * total / max(speed, 1e-9)
+    precision[V, V] = (max(speed, 1e-9) / (max(DRY_SHARE, 2.0 * MILD) * 5.0 * total)) ** 2
+
+
+def _with_table(base: Settings, e: Floats) -> Settings:
+    factor = np.interp(TABLE_X, np.arange(11) / 10.0, e)
+    table = np.asarray(base.plug_table) / factor
+    shrink = max(1.0, float(table.max()) / (0.99 * HIGHEST))
+    table = np.maximum(table / shrink, 1.01 * LOWEST)
+    diameter = base.plug_diameter / float(np.sqrt(shrink))
+    return base.replace(plug_table=tuple(float(f'{v:.4g}') for v in table), plug_diameter=diameter)
+
+
+def _final(
+    b: Blocks,
+    use: Floats,
+    s: Settings,
+    lag: Lag,
+    gain: float,
+    shape: float,
+    sheet: Settings,
+    given: Collection[str],
+    undetermined: list[str],
+) -> Balance:
+    force, columns, hats = regressor(b, s)
+    A = columns[use]
+    plugged = s.plug_diameter > 0.0
+    if plugged:
+        A = np.concatenate([columns, hats], axis=1)[use]
+    precision, mean = _prior(sheet, given, A.shape[1])
+    if plugged:
+        table = np.full((11, 11), 0.01**2) + np.eye(11) * 0.005**2
+        precision[TABLE:, TABLE:] = np.linalg.inv(table)
+    _viscous_prior(precision, mean, A, force[use], b.v[use], given)
+    floor = MODEL_ERROR * s.stiffness * s.stroke
+    fit = solve(A, force[use], precision, mean, 0.2 * floor, trust(b.v[use]))
+    K_, offset, viscous, dry, slow = (float(v) for v in fit.theta[:5])
+    origin = offset / (K_ * s.stroke) if K_ != 0.0 else np.inf
+    preload = origin if s.air_to == 'close' else -1.0 - origin
+    if K_ <= 0.0 or K_ * s.stroke < 2.0 * fit.sigma or preload > NO_SPRING:
+        raise CommissioningError(
+            f'no spring is seen (K = {K_:.3g} N/m, preload {preload:.3g} strokes): an actuator '
+            'without spring return, double acting, is not supported; of a valve with a spring '
+            'check area, stroke and the units of the pressures'
+        )
+    model = A[:, [K, ONE, V, S]]
+    viscous = max(viscous, 0.0)
+    settings = s.replace(
+        stiffness=float(f'{K_:.5g}'), preload=float(f'{max(preload, 0.0):.4g}')
+    )
+    sensors = float(np.std(np.diff(fit.left)[np.diff(b.index[use]) == 1])) / np.sqrt(2.0)
+    names = list(undetermined)
+    if plugged and float(np.std(b.dp[use])) < 1e-3 * max(float(np.mean(np.abs(b.dp[use]))), 1.0):
+        names.append('plug force apart from the spring (P1 - P2 did not vary)')
+    return Balance(
+        settings,
+        lag,
+        viscous,
+        abs(dry),
+        max(slow, 0.0),
+        fit.covariance[: S + 1, : S + 1],
+        fit.sigma,
+        sensors,
+        gain,
+        shape,
+        b.t[use],
+        b.x[use],
+        b.v[use],
+        force[use],
+        force[use] - fit.left,
+        model,
+        len(b.t) * b.width,
+        tuple(names),
+    )
+

@@ -1,0 +1,229 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""The command commission: what a valve is, from fault-free recordings of it."""
+
+import argparse
+import sys
+from pathlib import Path
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+from damadics_fd.bag.errors import BagError
+from damadics_fd.bag.recording import Recording, find_recordings, parse_maps
+from damadics_fd.commands.commission.errors import CommissioningError
+from damadics_fd.commands.commission.monitor import identify
+from damadics_fd.commands.commission.plot import draw
+from damadics_fd.commands.commission.valve_file import parameter_file
+from damadics_fd.core.identified import REFUSED, FaultFree, Identified
+from damadics_fd.core.settings import Settings, SettingsError
+from damadics_fd.store.references import Reference, save_reference
+
+EXAMPLES = """examples:
+  ros2 run damadics_fd commission bags/fault_free --actuator LV-101 --out lv101.yaml
+  ros2 run damadics_fd commission monday.csv tuesday.csv --map x1=POS*0.01 --set mass=3.5 \\
+      --set area=0.045 --days 90 --reference references/LV-101 --actuator LV-101 --out lv101.yaml
+  ros2 run damadics_fd commission before_the_fault.mcap --until 70 --out lv101.yaml
+  ros2 run damadics_fd commission day1.csv day2.csv --mode scada --out lv101.yaml"""
+FAILED, NOT_USABLE = 1, 3
+
+
+def arguments(args: list[str] | None = None) -> argparse.Namespace:
+    """
+    Parse the command line.
+
+    :param args: words; those of the process where absent.
+    :return: the options.
+    """
+    parser = argparse.ArgumentParser(
+        prog='commission',
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        description='Identify a valve from fault-free recordings in which it moves both ways for '
+        'some minutes: write its parameter file, and say what will be found with it. Exit code '
+        '0: ok or limited, 1: the recordings cannot be used, 3: refused.',
+    )
+    parser.add_argument(
+        'recordings', nargs='+', type=Path, metavar='RECORDING', help='MCAP, bag folder or table'
+    )
+    parser.add_argument('--mode', choices=('monitor', 'scada'), default='monitor')
+    parser.add_argument('--out', type=Path, metavar='FILE', help='write the parameter file (YAML)')
+    parser.add_argument('--plot', type=Path, metavar='FILE', help='draw the sanity plot (PNG)')
+    parser.add_argument(
+        '--until',
+        type=float,
+        metavar='S',
+        help='use the recordings up to that time only, counted from their beginning',
+    )
+    parser.add_argument(
+        '--reference',
+        type=Path,
+        metavar='PATH',
+        help='write what was learned as the reference, PATH.a.json or .b.json',
+    )
+    parser.add_argument('--actuator', default='', help='tag of the actuator, kept in the files')
+    parser.add_argument(
+        '--twin',
+        type=Path,
+        metavar='FILE',
+        help='write a model of this valve for plant and simulate --valve FILE',
+    )
+    parser.add_argument(
+        '--days',
+        type=float,
+        default=30.0,
+        help='at most one false alarm in so many days (default 30)',
+    )
+    parser.add_argument(
+        '--set',
+        action='append',
+        default=[],
+        metavar='NAME=VALUE',
+        help='a setting from the data sheet: mass, stroke, area, plug_diameter ..',
+    )
+    parser.add_argument('--topic', help='topic of the measurements')
+    parser.add_argument(
+        '--map',
+        action='append',
+        default=[],
+        metavar='SIGNAL=SOURCE[*FACTOR]',
+        help='where a signal is, as for replay',
+    )
+    options = parser.parse_args(args)
+    if not options.days > 0.0:
+        parser.error('--days must be positive')
+    if options.until is not None and not options.until > 0.0:
+        parser.error('--until must be positive')
+    if options.reference and not options.actuator:
+        parser.error('--reference belongs to an actuator: name it with --actuator')
+    if options.mode == 'scada' and (options.plot or options.twin):
+        parser.error('--plot and --twin are of mode monitor')
+    return options
+
+
+def read(recording: Recording, until: float | None = None) -> FaultFree:
+    """
+    Return the columns of a recording; damaged places are told and left out.
+
+    :param recording: what to read.
+    :param until: [s] from its beginning, after which nothing is used; None for all.
+    :return: the columns.
+    :raises CommissioningError: where nothing is left.
+    """
+    chunks = list(recording.chunks(lambda text: print(f'commission: {text}', file=sys.stderr)))
+    names = set.intersection(*(set(chunk) for chunk in chunks)) if chunks else set()
+    columns: dict[str, NDArray] = {
+        name: np.concatenate([chunk[name] for chunk in chunks]) for name in names
+    }
+    if 'stamp' not in columns and 'log_time' in columns:
+        columns['stamp'] = columns['log_time']
+    if 'stamp' not in columns or not len(columns['stamp']):
+        raise CommissioningError(f'{recording.name} holds no measurement')
+    if until is not None:
+        stamp = np.asarray(columns['stamp'], np.int64)
+        kept = stamp - stamp[0] <= until * 1e9
+        columns = {name: column[kept] for name, column in columns.items()}
+    return FaultFree(recording.name, columns)
+
+
+def data_sheet(texts: list[str], mode: str = 'monitor') -> tuple[Settings, set[str]]:
+    """
+    Return settings with the values of the command line.
+
+    :param texts: NAME=VALUE.
+    :param mode: monitor or scada.
+    :return: the settings, and the names that were given.
+    :raises SettingsError: listing every mistake.
+    """
+    values = {}
+    for text in texts:
+        name, equals, value = text.partition('=')
+        if not equals:
+            raise SettingsError([f'--set {text}: write NAME=VALUE'])
+        try:
+            values[name] = yaml.safe_load(value)
+        except yaml.YAMLError as error:
+            raise SettingsError([f'--set {text}: the value cannot be read']) from error
+    return Settings.for_mode(mode, **values), set(values)
+
+
+def main(args: list[str] | None = None) -> int:
+    """
+    Run the command.
+
+    :param args: words; those of the process where absent.
+    :return: exit code.
+    """
+    options = arguments(args)
+    try:
+        sheet, given = data_sheet(options.set, options.mode)
+        found = find_recordings(
+            options.recordings, topic=options.topic, maps=parse_maps(options.map)
+        )
+        recordings = [read(recording, options.until) for recording in found]
+        identified = _identify(recordings, sheet, given, options)
+        for line in identified.report:
+            print(line)
+        source = ', '.join(str(path) for path in options.recordings)
+        if options.out:
+            text = parameter_file(
+                identified,
+                options.mode,
+                source,
+                options.actuator,
+                str(options.reference or ''),
+            )
+            options.out.write_text(text, encoding='utf-8')
+        if options.reference and identified.verdict != REFUSED:
+            _write_reference(identified, recordings, options, source)
+    except (BagError, CommissioningError, SettingsError, KeyError, OSError, ValueError) as error:
+        print(f'commission: {error}', file=sys.stderr)
+        return FAILED
+    return NOT_USABLE if identified.verdict == REFUSED else 0
+
+
+def _identify(
+    recordings: list[FaultFree], sheet: Settings, given: set[str], options: argparse.Namespace
+) -> Identified:
+    if options.mode == 'scada':
+        from damadics_fd.core.scada.identify import identify as identify_scada
+
+        found: Identified = identify_scada(recordings, sheet, given)
+        return found
+    proposal = identify(recordings, sheet, given, options.days)
+    if options.plot:
+        draw(proposal, options.plot)
+    if options.twin:
+        from damadics_fd.commands.commission.twin import write_twin
+
+        write_twin(proposal, options.twin, options.actuator)
+    return proposal.identified(Settings.for_mode('monitor'))
+
+
+def _write_reference(
+    identified: Identified,
+    recordings: list[FaultFree],
+    options: argparse.Namespace,
+    source: str,
+) -> None:
+    if not identified.learned:
+        print('commission: nothing was learned: no reference is written', file=sys.stderr)
+        return
+    settings = Settings.for_mode(options.mode, **identified.settings)
+    written = save_reference(
+        options.reference,
+        Reference(
+            options.actuator,
+            dict(identified.learned),
+            settings.to_dict(),
+            source=source,
+            first_stamp=int(recordings[0].columns['stamp'][0]),
+            last_stamp=int(recordings[-1].columns['stamp'][-1]),
+        ),
+    )
+    print(f'reference of {options.actuator}: {written}')
+
+
+if __name__ == '__main__':
+    sys.exit(main())

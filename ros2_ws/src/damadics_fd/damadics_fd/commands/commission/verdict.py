@@ -1,0 +1,146 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""How far what was identified is to be trusted, and what will be found with it."""
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+import numpy as np
+
+from damadics_fd.commands.commission.balance import Balance, K
+from damadics_fd.commands.commission.lag import trust
+from damadics_fd.core.settings import Settings
+from damadics_fd.core.signature.state import SignatureSettings
+
+PARTS = 4  # of the moving time, compared with each other
+CERTAIN = 4.0  # standard deviations
+SHEET = 0.05  # share by which a stated constant may be off without a word
+REFERENCE = 2.0  # inflation of the variance of the reference, as in the signature
+GOOD_FRICTION, GOOD_SPRING = 1.0, 0.2  # smallest changes found of a valve that is not limited
+TRUSTED = 0.5  # of the friction: a larger misfit hides it
+
+
+@dataclass(frozen=True)
+class Found:
+    """Hold the smallest change of friction and stiffness, as shares, that raises an alarm."""
+
+    friction: float
+    spring: float
+
+
+def smallest(b: Balance, seconds: float) -> Found:
+    """
+    Return what the signature will find, from the information in its sums.
+
+    A change d raises D = d^2 (Jjj - Jj' (J + J0)^-1 Jj) to the level of the own alarm, with the
+    information J of the moving blocks in that time and J0 of the reference.
+
+    :param b: the balance.
+    :param seconds: of operation like in the recording.
+    :return: shares of friction and stiffness.
+    """
+    c = SignatureSettings.of(b.settings)
+    sigma = max(b.misfit, c.sigma_min * c.force_scale)
+    w = trust(b.v)
+    A = b.columns / sigma
+    S_all = (A * w[:, None]).T @ A
+    per = np.array([b.settings.stroke, 1.0, b.settings.stroke, 1.0])
+    floor = np.array(c.floor) * c.force_scale / per
+    J0 = np.linalg.inv(REFERENCE * np.linalg.pinv(S_all) + np.diag(floor**2))
+    per_second = float(w.sum()) / max(b.watched, 1.0)
+    share = min(c.memory[2], per_second * seconds) / float(w.sum())
+    J = share * S_all
+    friction = np.array([0.0, 0.0, b.viscous, b.friction])
+    spring = np.array([b.settings.stiffness, 0.0, 0.0, 0.0])
+    eliminated = J - J @ np.linalg.solve(J + J0, J)
+    sizes = [
+        float(np.sqrt(c.d_alarm / max(float(d @ eliminated @ d), 1e-12)))
+        for d in (friction, spring)
+    ]
+    return Found(*sizes)
+
+
+def parts_differ(b: Balance) -> list[str]:
+    """
+    Compare the parts of the recordings: a fault-free valve stays the same.
+
+    :param b: the balance.
+    :return: a sentence for each quantity that differs.
+    """
+    order = np.array_split(np.arange(len(b.t)), PARTS)
+    rows = []
+    floor = max(b.misfit, 1e-9)
+    lean = np.zeros((4, 4))  # the viscous part is that of all, give or take the dry one
+    lean[2, 2] = (0.3 * b.viscous + 10.0 * b.friction / b.settings.stroke + 1e-9) ** -2
+    for part in order:
+        A, y, w = b.columns[part], b.force[part], trust(b.v[part])
+        up = int(np.sum(b.v[part] > 0.0))
+        if min(up, len(part) - up) < 5 or np.ptp(b.x[part]) < 0.1:
+            continue
+        mean = np.array([0.0, 0.0, b.viscous, 0.0])
+        H = (A * w[:, None]).T @ A / floor**2 + lean
+        theta = np.linalg.solve(H, (A * w[:, None]).T @ y / floor**2 + lean @ mean)
+        left = y - A @ theta
+        noise = max(float(np.sqrt(np.sum(w * left**2) / max(w.sum() - 4.0, 1.0))), floor)
+        v = b.settings.stroke * float(np.median(np.abs(b.v)))
+        to_total = np.array([0.0, 0.0, v, 1.0])
+        cov = np.linalg.inv(H) * (noise / floor) ** 2
+        rows.append(
+            (
+                float(to_total @ theta),
+                float(np.sqrt(to_total @ cov @ to_total)),
+                float(theta[K]),
+                float(np.sqrt(cov[K, K])),
+                noise,
+            )
+        )
+    if len(rows) < 2:
+        return []
+    friction, friction_std, stiffness, stiffness_std, _ = np.array(rows).T
+    s, found = b.settings, []
+    for name, values, std, share, unit in (
+        ('friction', friction, friction_std, s.material_friction, 'N'),
+        ('stiffness', stiffness, stiffness_std, s.material_spring, 'N/m'),
+    ):
+        low, high = int(np.argmin(values)), int(np.argmax(values))
+        width = float(np.hypot(std[low], std[high]))
+        allowed = share * abs(float(np.median(values))) + CERTAIN * width
+        if values[high] - values[low] > allowed:
+            found.append(
+                f'the {name} is not the same throughout ({values[low]:.4g} to {values[high]:.4g} '
+                f'{unit}): a fault in the recording, or two valves? see --until'
+            )
+    return found
+
+
+def sheet_differs(b: Balance, sheet: Settings, given: Collection[str]) -> list[str]:
+    """
+    Name the stated constants that the valve does not have.
+
+    :param b: the balance.
+    :param sheet: what was stated.
+    :param given: names of what was stated.
+    :return: a sentence for each.
+    """
+    found = []
+    for name, stated, seen in (
+        ('stiffness', sheet.stiffness, b.settings.stiffness),
+        ('preload', 1.0 + sheet.preload, 1.0 + b.settings.preload),
+    ):
+        if name in given and abs(seen / stated - 1.0) > SHEET:
+            shown = (getattr(sheet, name), getattr(b.settings, name))
+            found.append(f'{name} is stated as {shown[0]:.4g} and found to be {shown[1]:.4g}')
+    if sheet.plug_diameter > 0.0 and abs(b.gain - 1.0) > SHEET:
+        found.append(f'the plug force is {b.gain:.2f} of what plug_diameter and plug_table say')
+    return found
+
+
+def hidden_friction(b: Balance) -> bool:
+    """
+    Tell whether the balance leaves more than half the friction unexplained.
+
+    :param b: the balance.
+    :return: True where friction faults cannot be seen.
+    """
+    return b.misfit > TRUSTED * max(b.total, 1e-9)
+
