@@ -9,7 +9,6 @@ from damadics_fd.core.record import Floats, Ints
 
 OK, LIMITED, REFUSED = 'ok', 'limited', 'refused'
 VERDICTS = (OK, LIMITED, REFUSED)
-Value = bool | float | str | list[float]
 
 
 @dataclass(frozen=True)
@@ -17,10 +16,10 @@ class Identified:
     """Hold settings of a valve, how far they are to be trusted, and why."""
 
     verdict: str  # OK, LIMITED or REFUSED
-    settings: Mapping[str, Value]  # by name; those that equal the defaults may be left out
+    settings: Mapping[str, Plain]  # by name; those that equal the defaults may be left out
     report: tuple[str, ...]  # lines for people: what was found, in the order to be printed
     reasons: tuple[str, ...] = ()  # why it is not OK: what does not fit, what will be missed
-    learned: Mapping[str, object] = field(default_factory=dict)  # for a reference; {}: none
+    learned: Mapping[str, Plain] = field(default_factory=dict)  # for a reference; {}: none
 
 
 @dataclass(frozen=True)

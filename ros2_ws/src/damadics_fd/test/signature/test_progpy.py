@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import yaml
 from damadics_fd.bag import write_columns
-from damadics_fd.commands.commission import main as commission
+from damadics_fd.commands.commission.command import main as commission
 from damadics_fd.core.monitor import run
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.signature.signature import SignatureView
@@ -89,9 +89,7 @@ def settings(tmp_path_factory: pytest.TempPathFactory) -> Settings:
     out = folder / 'valve.yaml'
     assert commission([str(folder / 'healthy.mcap'), '--out', str(out), *given]) == 0
     (node,) = yaml.safe_load(out.read_text()).values()
-    return Settings(
-        **{**node['ros__parameters'], 'plug_table': tuple(node['ros__parameters']['plug_table'])}
-    )
+    return Settings.from_mapping(node['ros__parameters'])
 
 
 def judged(settings: Settings, fault: str, factor: float) -> SignatureView:

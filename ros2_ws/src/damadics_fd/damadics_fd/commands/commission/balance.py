@@ -7,9 +7,10 @@ air Ae Ps + m g = K L (X + origin) + c L v + (Fc + Fs e^-(v/vs)^2) sgn v + flow 
 """
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from damadics_fd.commands.commission.errors import CommissioningError
 from damadics_fd.commands.commission.lag import (
@@ -25,12 +26,14 @@ from damadics_fd.commands.commission.signals import Blocks, Signals, blocks
 from damadics_fd.core.record import Floats
 from damadics_fd.core.settings import Settings
 
+Mask = NDArray[np.bool_]
 BLOCK = 0.1  # s
+SAME_LAG = 0.003  # s
 LEAST = 20  # moving blocks each way
 MODEL_ERROR = 1e-3  # of the spring force over the stroke: the balance is no better than that
 WIDE, NARROW = (0.5, 0.2), (0.05, 0.03)  # prior of the plug force: in common, per node
 VISCOUS_STD = 0.3  # how well a data sheet's viscous friction is known, as a share
-MILD, DRY_SHARE = 0.15, 0.3  # a viscous share of friction at the usual speed, and its deviation
+MILD = 0.15  # viscous share of friction at the usual speed, give or take as much
 TABLE_X = np.r_[0.0:0.91:0.1, 0.99, 1.0]
 LOWEST, HIGHEST = 0.01, 10.0  # entries of plug_table
 NO_SPRING = 10.0  # strokes of preload that no spring has
@@ -105,21 +108,34 @@ def find_balance(signals: Signals, sheet: Settings, given: Collection[str] = ())
     :raises CommissioningError: where the stem moves too little, or the fit is no valve.
     """
     fine = blocks(signals, WIDTH)
-    lag = find_lag(fine, sheet)
+    viscous = sheet.alpha1 * sheet.mass if 'alpha1' in given else None
+    lag = find_lag(fine, sheet, viscous)
     s, undetermined = _directed(sheet, lag, given)
-    balance = None
-    for _ in range(2):  # a better plug force tells the lag better, and the reverse
-        s = s.replace(ps_lag=float(f'{lag.seconds:.3g}'))
-        b = blocks(signals, BLOCK, s.ps_lag)
-        use = _enough(b)
-        s, gain, shape = _plug(b, use, s, sheet, given)
-        balance = _final(b, use, s, lag, gain, shape, sheet, given, undetermined)
-        again = find_lag(fine, s)
-        if abs(again.seconds - lag.seconds) < 0.003:
-            break
+    balance = _with_lag(signals, s, lag, sheet, given, undetermined)
+    again = find_lag(fine, balance.settings, viscous)  # a better plug force tells the lag better
+    if abs(again.seconds - lag.seconds) >= SAME_LAG:
         lag = again
-    assert balance is not None
+        balance = _with_lag(signals, s, lag, sheet, given, undetermined)
+    if lag.seconds > 0.0:  # a lag that leaves more than none was no lag
+        none = _with_lag(signals, s, replace(lag, seconds=0.0), sheet, given, undetermined)
+        if none.misfit < balance.misfit:
+            return none
     return balance
+
+
+def _with_lag(
+    signals: Signals,
+    s: Settings,
+    lag: Lag,
+    sheet: Settings,
+    given: Collection[str],
+    undetermined: list[str],
+) -> Balance:
+    s = s.replace(ps_lag=float(f'{lag.seconds:.3g}'))
+    b = blocks(signals, BLOCK, s.ps_lag)
+    use = _enough(b)
+    s, gain, shape = _plug(b, use, s, sheet, given)
+    return _final(b, use, s, lag, gain, shape, sheet, given, undetermined)
 
 
 def _directed(sheet: Settings, lag: Lag, given: Collection[str]) -> tuple[Settings, list[str]]:
@@ -140,7 +156,14 @@ def _directed(sheet: Settings, lag: Lag, given: Collection[str]) -> tuple[Settin
     return sheet.replace(air_to=air, flow_to=flow), undetermined
 
 
-def _enough(b: Blocks) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def _blur(b: Blocks, use: Mask, s: Settings) -> float:
+    """Return the variance that noise of x1 puts into the velocity of a block [m2/s2]."""
+    thirds = np.abs(np.diff(b.x, 3))[use[:-3] & use[3:] & (b.index[3:] - b.index[:-3] == 3)]
+    noise = 1.4826 * float(np.median(thirds)) / np.sqrt(20.0) if len(thirds) else 0.0
+    return float(2.0 * (s.stroke * noise / (2.0 * b.width)) ** 2)
+
+
+def _enough(b: Blocks) -> Mask:
     use = b.moving
     up, down = int(np.sum(use & (b.v > 0.0))), int(np.sum(use & (b.v < 0.0)))
     if min(up, down) < LEAST:
@@ -185,7 +208,13 @@ def regressor(b: Blocks, s: Settings) -> tuple[Floats, Floats, Floats]:
 
 
 def solve(
-    A: Floats, y: Floats, precision: Floats, mean: Floats, floor: float, weights: Floats
+    A: Floats,
+    y: Floats,
+    precision: Floats,
+    mean: Floats,
+    floor: float,
+    weights: Floats,
+    blur: float = 0.0,
 ) -> Fit:
     """
     Fit by least squares with a prior; outliers count less.
@@ -196,13 +225,20 @@ def solve(
     :param mean: of the prior, shape (p,).
     :param floor: least standard deviation of the noise [N].
     :param weights: weight of each row, shape (n,).
+    :param blur: variance of the noise in the column of the velocity, which would pull the
+        viscous friction to zero.
     :return: the fit.
     """
     sigma, weight = max(float(np.std(y)), floor), weights
-    theta, H, left = mean, precision, y
+    theta: Floats = mean
+    H, left = precision, y
     for _ in range(6):
-        H = (A * weight[:, None]).T @ A / sigma**2 + precision
-        theta = np.linalg.solve(H, (A * weight[:, None]).T @ y / sigma**2 + precision @ mean)
+        H = (A * weight[:, None]).T @ A / sigma**2
+        known = 1.0 / max(float(np.linalg.pinv(H)[V, V]), 1e-300)
+        H[V, V] -= min(blur * float(weight.sum()) / sigma**2, 0.999 * known)
+        H += precision
+        right = (A * weight[:, None]).T @ y / sigma**2 + precision @ mean
+        theta = np.asarray(np.linalg.solve(H, right), float)
         left = y - A @ theta
         spread = max(1.4826 * float(np.median(np.abs(left[weights > 0.3 * weights.max()]))), floor)
         weight = weights * np.minimum(1.0, 3.0 * spread / np.maximum(np.abs(left), 1e-12))
@@ -210,7 +246,7 @@ def solve(
     change = theta - mean
     objective = float(np.sum(weight * left**2)) / sigma**2 + float(change @ precision @ change)
     objective += 2.0 * len(y) * float(np.log(sigma))
-    return Fit(theta, np.linalg.inv(H), sigma, objective, left)
+    return Fit(theta, np.asarray(np.linalg.inv(H), float), sigma, objective, left)
 
 
 def _prior(sheet: Settings, given: Collection[str], size: int) -> tuple[Floats, Floats]:
@@ -227,7 +263,7 @@ def _prior(sheet: Settings, given: Collection[str], size: int) -> tuple[Floats, 
 
 
 def _plug(
-    b: Blocks, use: Floats, s: Settings, sheet: Settings, given: Collection[str]
+    b: Blocks, use: Mask, s: Settings, sheet: Settings, given: Collection[str]
 ) -> tuple[Settings, float, float]:
     """Fit the plug force table; return settings, gain and departure of the shape."""
     if s.plug_diameter <= 0.0:
@@ -243,7 +279,7 @@ def _plug(
         precision[TABLE:, TABLE:] = np.linalg.inv(table)
         _viscous_prior(precision, mean, A, force[use], b.v[use], given)
         floor = MODEL_ERROR * s.stiffness * s.stroke
-        fit = solve(A, force[use], precision, mean, floor, trust(b.v[use]))
+        fit = solve(A, force[use], precision, mean, floor, trust(b.v[use]), _blur(b, use, s))
         e_total = np.maximum(e_total * (1.0 + fit.theta[TABLE:]), 0.003)
         rows = _with_table(base, e_total)
         common, per_node = NARROW
@@ -263,7 +299,7 @@ def _viscous_prior(
     speed = float(np.median(np.abs(A[:, V])))
     total = abs(float(theta[S - 1])) + 1e-9  # the column of Fc has moved up by one
     mean[V] = MILD * total / max(speed, 1e-9)
-    precision[V, V] = (max(speed, 1e-9) / (max(DRY_SHARE, 2.0 * MILD) * 5.0 * total)) ** 2
+    precision[V, V] = (max(speed, 1e-9) / (MILD * total)) ** 2
 
 
 def _with_table(base: Settings, e: Floats) -> Settings:
@@ -277,7 +313,7 @@ def _with_table(base: Settings, e: Floats) -> Settings:
 
 def _final(
     b: Blocks,
-    use: Floats,
+    use: Mask,
     s: Settings,
     lag: Lag,
     gain: float,
@@ -297,7 +333,7 @@ def _final(
         precision[TABLE:, TABLE:] = np.linalg.inv(table)
     _viscous_prior(precision, mean, A, force[use], b.v[use], given)
     floor = MODEL_ERROR * s.stiffness * s.stroke
-    fit = solve(A, force[use], precision, mean, 0.2 * floor, trust(b.v[use]))
+    fit = solve(A, force[use], precision, mean, 0.2 * floor, trust(b.v[use]), _blur(b, use, s))
     K_, offset, viscous, dry, slow = (float(v) for v in fit.theta[:5])
     origin = offset / (K_ * s.stroke) if K_ != 0.0 else np.inf
     preload = origin if s.air_to == 'close' else -1.0 - origin
@@ -309,9 +345,7 @@ def _final(
         )
     model = A[:, [K, ONE, V, S]]
     viscous = max(viscous, 0.0)
-    settings = s.replace(
-        stiffness=float(f'{K_:.5g}'), preload=float(f'{max(preload, 0.0):.4g}')
-    )
+    settings = s.replace(stiffness=float(f'{K_:.5g}'), preload=float(f'{max(preload, 0.0):.4g}'))
     sensors = float(np.std(np.diff(fit.left)[np.diff(b.index[use]) == 1])) / np.sqrt(2.0)
     names = list(undetermined)
     if plugged and float(np.std(b.dp[use])) < 1e-3 * max(float(np.mean(np.abs(b.dp[use]))), 1.0):
@@ -336,4 +370,3 @@ def _final(
         len(b.t) * b.width,
         tuple(names),
     )
-

@@ -15,8 +15,7 @@ from damadics_fd.core.settings import Settings
 
 Columns = Mapping[str, NDArray]
 TRAVEL = 0.2  # of the stroke, at least
-LAGS = 50  # blocks by which the stem may follow its command
-CLEARLY = 0.2  # correlation from which a direction counts
+CLEARLY, STRONGLY = 0.2, 0.5  # correlation from which a direction counts
 ROOM = 0.95  # of a range that may be used
 FROZEN = 0.9  # share of equal neighbours beyond which a pressure is frozen
 
@@ -57,7 +56,7 @@ def check_directions(b: Blocks, flow: Floats | None) -> None:
     Refuse an inverted command or position.
 
     The stem moves towards its command: its velocity goes with cv - x1, whatever the two do
-    together at one instant.
+    together at one instant. Where it follows without error, they go together.
 
     :param b: blocks of the whole recording.
     :param flow: of the blocks, where it is measured.
@@ -69,25 +68,26 @@ def check_directions(b: Blocks, flow: Floats | None) -> None:
             f'the stem moves only {travel:.2f} of its stroke: move the valve through '
             f'{TRAVEL:g} or more, both ways'
         )
-    best = 0.0
-    for lag in range(0, min(LAGS, len(b.x) // 4)):
-        cv = b.cv[: len(b.cv) - lag]
-        error, v = cv - b.x[lag:], b.v[lag:]
-        use = np.isfinite(v)
-        if use.sum() > 10 and np.ptp(error[use]) > 0.0 and np.ptp(v[use]) > 0.0:
-            r = float(np.corrcoef(error[use], v[use])[0, 1])
-            best = r if abs(r) > abs(best) else best
-    if best > -CLEARLY:
+    use = np.isfinite(b.v)
+    towards = _correlation(b.cv[use] - b.x[use], b.v[use])
+    together = _correlation(b.cv, b.x)
+    if towards > -CLEARLY and not (towards < CLEARLY and together < -STRONGLY):
         return
     which = 'one of them is inverted'
     if flow is not None and np.isfinite(flow).sum() > 10:
         good = np.isfinite(flow)
-        r = float(np.corrcoef(flow[good], b.x[good])[0, 1])
+        r = _correlation(flow[good], b.x[good])
         if abs(r) > CLEARLY:
             which = f'{"x1" if r > 0.0 else "cv"} is inverted, as the flow shows'
     raise CommissioningError(
         f'x1 moves away from cv: {which}; 1 must mean closed in both (--map x1=1-SOURCE)'
     )
+
+
+def _correlation(a: Floats, b: Floats) -> float:
+    if np.ptp(a) == 0.0 or np.ptp(b) == 0.0:
+        return 0.0
+    return float(np.corrcoef(a, b)[0, 1])
 
 
 def dead_signals(recordings: Sequence[FaultFree]) -> list[str]:

@@ -210,7 +210,7 @@ def _write_reference(
     if not identified.learned:
         print('commission: nothing was learned: no reference is written', file=sys.stderr)
         return
-    settings = Settings.for_mode(options.mode, **identified.settings)
+    settings = Settings.from_mapping({'mode': options.mode, **identified.settings})
     written = save_reference(
         options.reference,
         Reference(

@@ -25,9 +25,13 @@ STRIBECK = 0.026  # strokes/s, as in the signature
 LEAST_GAIN = 16.0  # in chi-square, for which a lag is believed
 SIGN_GAIN = 9.0  # and a direction
 LEAST_LAG = 0.008  # s
+CALM = 9  # blocks over which P1 - P2 is averaged: its noise must not call for a lag
+UNSURE = 0.1  # share of the correction for sensor noise that may be wrong
+STATED = 0.3  # share to which a stated viscous friction is known
 LEAST_STD = 2e-3  # s; what blocks and model leave open
 FREE, NODES = 6, 11  # columns besides the plug force; nodes of its table
 SIGNED = (0, 2, 3)  # stiffness, viscous and dry friction push against the air
+SURE = 0.045  # strokes/s well above which nothing sticks any more
 CREEP = 40.0  # times the variance of a block that hardly moves
 
 
@@ -63,7 +67,7 @@ def trust(v: Floats) -> Floats:
     :param v: [strokes/s].
     :return: at most 1.
     """
-    weight: Floats = 1.0 / (1.0 + CREEP * np.exp(-((v / STRIBECK) ** 2)))
+    weight: Floats = 1.0 / (1.0 + CREEP * np.exp(-((v / SURE) ** 2)))
     return weight
 
 
@@ -81,18 +85,19 @@ def strokes(b: Blocks) -> list[slice]:
     return [run for run in runs if run.stop - run.start >= SHORTEST]
 
 
-def find_lag(b: Blocks, s: Settings) -> Lag:
+def find_lag(b: Blocks, s: Settings, viscous: float | None = None) -> Lag:
     """
     Find the lag of ps and the directions of air and flow.
 
     :param b: blocks of WIDTH, nothing delayed.
     :param s: settings with stroke, area, plug.
+    :param viscous: stated viscous friction [N s/m]; None where it is not stated.
     :return: the likeliest.
     """
     runs = strokes(b)
     if len(runs) < 4:
         return Lag(0.0, 0.0, 1.0, 1.0, 0.0, 0.0)
-    scan = _Scan(b, s, runs)
+    scan = _Scan(b, s, runs, viscous)
     raw = [min(fit.score for fit in scan.fits(T, 1.0).values()) for T in GRID]
     noise = max(min(raw) / max(scan.rows - 20, 1), 1e-6)
     table = {T: scan.fits(T, noise) for T in GRID}
@@ -100,7 +105,9 @@ def find_lag(b: Blocks, s: Settings) -> Lag:
     air = 1.0 if least[1.0] <= least[-1.0] else -1.0
     score = {T: row[air].score for T, row in table.items()}
     T, std = _refine(score, lambda lag: scan.fits(lag, noise)[air].score)
-    if score[0.0] - min(score.values()) < LEAST_GAIN or T < LEAST_LAG:
+    corrected = scan.rows * scan.floating * (1.0 - _smoothing(b.width, T)) / noise
+    gained = score[0.0] - min(score.values())
+    if gained < max(LEAST_GAIN, UNSURE * corrected) or T < LEAST_LAG:
         T = 0.0
     fit = scan.fits(T, noise)[air]
     return Lag(
@@ -125,9 +132,11 @@ class _Fit:
 class _Scan:
     """Strokes laid out side by side, to be fitted for one lag after the other."""
 
-    def __init__(self, b: Blocks, s: Settings, runs: list[slice]) -> None:
+    def __init__(self, b: Blocks, s: Settings, runs: list[slice], viscous: float | None) -> None:
+        self.viscous = viscous
         gain = plug_per_pascal(s, b.x)
         v = np.nan_to_num(b.v)
+        dp = np.convolve(np.pad(b.dp, CALM // 2, 'edge'), np.full(CALM, 1.0 / CALM), 'valid')
         columns = [
             s.stroke * b.x,
             np.ones(len(v)),
@@ -141,7 +150,7 @@ class _Scan:
         self.plugged = s.plug_diameter > 0.0 and float(np.mean(np.abs(b.dp))) > 0.0
         if self.plugged:
             hats = np.clip(1.0 - np.abs(b.x * 10.0 - np.arange(NODES)[:, None]), 0.0, 1.0)
-            columns += list(gain * b.dp * hats)
+            columns += list(gain * dp * hats)
             spread = np.full((NODES, NODES), 1.0) + 0.2**2 * np.eye(NODES)
             full = np.zeros((FREE + NODES, FREE + NODES))
             full[:FREE, :FREE], full[FREE:, FREE:] = self.precision, np.linalg.inv(spread)
@@ -199,6 +208,13 @@ class _Scan:
         """Fit with a spring and a friction that push the right way."""
         A, b = H / noise + self.precision, g / noise
         A += np.diag(1e-12 * np.diag(A))
+        least = 0.0
+        if self.viscous is not None:
+            known = 1.0 / (STATED * max(self.viscous, 1.0)) ** 2
+            A[2, 2] += known
+            b = b.copy()
+            b[2] += known * air * self.viscous
+            least = known * self.viscous**2
         free = np.ones(len(g), bool)
         theta = np.zeros(len(g))
         for _ in range(len(SIGNED) + 1):
@@ -208,13 +224,11 @@ class _Scan:
             if not wrong:
                 break
             free[min(wrong, key=lambda i: air * theta[i] * np.sqrt(A[i, i]))] = False
-        score = yy / noise - 2.0 * float(theta @ b) + float(theta @ A @ theta)
+        score = least + yy / noise - 2.0 * float(theta @ b) + float(theta @ A @ theta)
         if not self.plugged:
             return _Fit(score, 0.0, 0.0)
         covariance = np.linalg.inv(A[np.ix_(free, free)])[-NODES:, -NODES:]
-        return _Fit(
-            score, float(theta[FREE:].mean()), float(np.sqrt(max(covariance.mean(), 0.0)))
-        )
+        return _Fit(score, float(theta[FREE:].mean()), float(np.sqrt(max(covariance.mean(), 0.0))))
 
 
 def _sensor_noise(b: Blocks, s: Settings, runs: list[slice], gain: Floats) -> float:
@@ -229,7 +243,7 @@ def _sensor_noise(b: Blocks, s: Settings, runs: list[slice], gain: Floats) -> fl
     moved = np.concatenate([b.x[run] for run in runs])
     force = np.concatenate([s.area * b.ps[run] for run in runs])
     slope = float(np.polyfit(moved, force, 1)[0])
-    return float((slope * x) ** 2 + plug**2)
+    return float((slope * x) ** 2 + plug**2 / CALM)
 
 
 def _smoothing(width: float, T: float) -> float:

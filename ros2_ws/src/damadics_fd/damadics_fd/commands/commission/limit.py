@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damadics_fd.core.modes import PHASE_MONITOR
-from damadics_fd.core.pipeline import Result
+from damadics_fd.core.result import Result
 from damadics_fd.core.settings import Settings
 
 DAY = 86400.0
@@ -59,7 +59,7 @@ def watched(result: Result, settings: Settings) -> NDArray[np.bool_]:
     :return: mask.
     """
     e = result.estimates
-    x = e['x1_hat'] + e['xi1'] - settings.preload
+    x = e['x1_hat'] + e['xi1'] - settings.spring_origin
     mask: NDArray[np.bool_] = (
         result.accepted
         & (e['phase'] == PHASE_MONITOR)

@@ -16,7 +16,7 @@ from damadics_fd.commands.commission.checks import (
     ranges,
 )
 from damadics_fd.commands.commission.errors import CommissioningError
-from damadics_fd.commands.commission.limit import Limit, set_limit
+from damadics_fd.commands.commission.limit import Limit, set_limit, watched
 from damadics_fd.commands.commission.signals import APART, Signals, blocks, gather
 from damadics_fd.commands.commission.tuning import tune
 from damadics_fd.commands.commission.verdict import (
@@ -29,7 +29,8 @@ from damadics_fd.commands.commission.verdict import (
     smallest,
 )
 from damadics_fd.core.identified import LIMITED, OK, REFUSED, FaultFree, Identified
-from damadics_fd.core.pipeline import Result, run
+from damadics_fd.core.monitor import run
+from damadics_fd.core.result import Result
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.signature.state import MIN_RATE
 
@@ -120,13 +121,16 @@ def _propose(
     settings, noise, remarks = tune(columns, balance, quiet)
     settings = settings.replace(signature=sheet.signature, own_alarm=sheet.own_alarm)
     result = run(columns, settings)
-    limiting, refusing = [], []
+    limiting: list[str] = []
+    refusing: list[str] = []
     settings, limit, reasons = _limited(settings, result, days)
     limiting += reasons
     minute, hour = smallest(balance, 60.0), smallest(balance, 3600.0)
     hidden = hidden_friction(balance)
-    missed = f'friction below +{100.0 * hour.friction:.0f} % and spring changes below ' \
+    missed = (
+        f'friction below +{100.0 * hour.friction:.0f} % and spring changes below '
         f'{100.0 * hour.spring:.2g} % will be missed'
+    )
     if dead:
         text = f'{"; ".join(dead)}; {missed}'
         (refusing if hidden or 'ps' in text[:3] else limiting).append(text)
@@ -135,7 +139,7 @@ def _propose(
             f'the force balance leaves {balance.misfit:.3g} N, more than half the friction of '
             f'{balance.total:.3g} N: {missed}; check P1, P2, ps, area, plug_diameter'
         )
-    elif hour.friction > GOOD_FRICTION or hour.spring > GOOD_SPRING:
+    elif not dead and (hour.friction > GOOD_FRICTION or hour.spring > GOOD_SPRING):
         limiting.append(missed)
     limiting += parts_differ(balance)
     if result.detections:
@@ -172,10 +176,8 @@ def _limited(
         if not result.estimator.monitoring:
             why = f'the recording does not finish learning ({result.estimator.status})'
         reasons.append(f'no limit can be proposed: {why}; record longer')
-        ratios = result.decisions['ratio'][result.accepted]
-        seen = float(np.max(ratios[np.isfinite(ratios)], initial=0.0))
-        if result.estimator.monitoring and 0.5 < seen < 1e6:
-            ratio = SEEN * seen
+        ratios = result.decisions['ratio'][watched(result, settings)]
+        ratio = SEEN * float(np.max(ratios, initial=0.0))
     if ratio > 1.0:
         ratio = float(f'{ratio:.3g}')
         step = ratio / settings.level_maintenance

@@ -171,6 +171,4 @@ def blocks(signals: Signals, width: float, lag: float = 0.0) -> Blocks:
         v[1:-1] = (mx[2:] - mx[:-2]) / span
         rate_dp[1:-1] = (mdp[2:] - mdp[:-2]) / span
     v[~mid] = np.nan
-    return Blocks(
-        width, index, part, t, mx, means(signals.cv), mdp, means(signals.ps), v, rate_dp
-    )
+    return Blocks(width, index, part, t, mx, means(signals.cv), mdp, means(signals.ps), v, rate_dp)

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from numpy.typing import NDArray
 
 from damadics_fd.commands.commission.balance import Balance
-from damadics_fd.core.pipeline import run
+from damadics_fd.core.approximator.estimator import Estimator
+from damadics_fd.core.monitor import Chain
 from damadics_fd.core.settings import Settings
 
 BANDWIDTHS = (50.0, 25.0)  # rad/s, tried from the fast one on until the noise is low enough
@@ -45,7 +46,9 @@ def tune(
     )
     for wn in BANDWIDTHS:
         scaled = scaled.replace(wn=wn)
-        state = run(columns, scaled).estimator.state[0]
+        estimator = Estimator(scaled)
+        Chain(scaled, estimator=estimator).run(columns)
+        state = estimator.state[0]
         noise = 1.4826 * float(state.noise) / pole
         if 4.0 * noise <= scaled.dz:
             break

@@ -2,9 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The file of a valve: what differs from the defaults, tag and reference, and the verdict."""
 
-from collections.abc import Iterable
-
-from damadics_fd.core.identified import Identified, Value
+from damadics_fd.core.identified import Identified
+from damadics_fd.core.record import Plain
 from damadics_fd.core.settings import Settings
 
 WIDTH = 96
@@ -45,7 +44,7 @@ def parameter_file(
     return '\n'.join(lines) + '\n'
 
 
-def value_text(value: Value | Iterable[float]) -> str:
+def value_text(value: Plain) -> str:
     """
     Return a value as both YAML and ROS read it: a float never looks like a whole number.
 
@@ -61,7 +60,9 @@ def value_text(value: Value | Iterable[float]) -> str:
         return text.replace('e', '.0e') if 'e' in text and '.' not in text else text
     if isinstance(value, str):
         return quoted(value) if not value.isidentifier() else value
-    return '[' + ', '.join(value_text(float(v)) for v in value) + ']'
+    if isinstance(value, list):
+        return '[' + ', '.join(value_text(v) for v in value) + ']'
+    raise ValueError(f'{value!r} is no parameter')
 
 
 def quoted(text: str) -> str:

@@ -143,4 +143,3 @@ def hidden_friction(b: Balance) -> bool:
     :return: True where friction faults cannot be seen.
     """
     return b.misfit > TRUSTED * max(b.total, 1e-9)
-

@@ -1,0 +1,85 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Valves that are not the model inside: what commission finds of them, and what is monitored."""
+
+import numpy as np
+import pytest
+from damadics_fd.commands.commission.balance import find_balance
+from damadics_fd.commands.commission.signals import gather
+from damadics_fd.core.identified import FaultFree
+from damadics_fd.core.settings import Settings
+
+from . import valve as foreign
+from .trial import commissioned, trial
+
+
+def balance(build, seed, minutes=10.0, spoil=None):
+    columns = foreign.simulate(build, foreign.steps(60.0 * minutes, seed), seed=seed)
+    if spoil:
+        columns = spoil(columns)
+    sheet = Settings.for_mode('monitor', **foreign.sheet(build))
+    return find_balance(gather([FaultFree('strokes', columns)]), sheet)
+
+
+@pytest.mark.parametrize('air', ['close', 'open'])
+@pytest.mark.parametrize('flow', ['open', 'close'])
+def test_action_and_direction_of_flow_are_found(air, flow):
+    low = {'p1': 1.2e6, 'p2': 0.9e6} if air == flow else {}  # more could not be moved
+    build = foreign.random_valve(21, air_to=air, flow_to=flow, **low)
+    b = balance(build, 21)
+    assert (b.settings.air_to, b.settings.flow_to) == (air, flow)
+    assert b.undetermined == ()
+    assert b.settings.stiffness == pytest.approx(build.stiffness, rel=0.03)
+    assert b.settings.preload == pytest.approx(build.preload, abs=0.03)
+    assert b.friction == pytest.approx(build.dry * build.force, rel=0.25)
+
+
+@pytest.mark.parametrize('lag', [0.05, 0.1, 0.2])
+def test_the_lag_of_the_pressure_is_found(lag):
+    build = foreign.random_valve(22, ps_lag=lag)
+    b = balance(build, 22)
+    assert b.settings.ps_lag == pytest.approx(lag, abs=0.015)
+    assert b.settings.stiffness == pytest.approx(build.stiffness, rel=0.03)
+
+
+@pytest.mark.parametrize('wrong', [{'plug_gain': 1.2}, {'plug_shape': 0.1}, {'plug_gain': 0.15}])
+def test_the_plug_force_is_found(wrong):
+    build = foreign.random_valve(23, **wrong)
+    s = balance(build, 23).settings
+    shape = 1 + build.plug_shape * np.sin(2 * np.pi * foreign.NODES + 0.7)
+    true = foreign.SHEET_KM / (build.plug_gain * shape)
+    found = np.array(s.plug_table) * (build.plug_diameter / s.plug_diameter) ** 2
+    assert found[:10] == pytest.approx(true[:10], rel=0.05)
+
+
+def test_five_percent_of_missing_or_doubled_samples_do_not_matter():
+    rng = np.random.default_rng(5)
+
+    def spoil(columns):
+        columns['ps'][rng.random(len(columns['ps'])) < 0.05] = np.nan
+        late = np.flatnonzero(rng.random(len(columns['ps'])) < 0.05)[1:]
+        columns['stamp'][late] = columns['stamp'][late - 1]
+        return columns
+
+    build = foreign.random_valve(24)
+    b = balance(build, 24, spoil=spoil)
+    assert b.settings.stiffness == pytest.approx(build.stiffness, rel=0.03)
+
+
+@pytest.mark.parametrize(
+    'change',
+    [{'plug_shape': 0.1}, {'air_to': 'open', 'flow_to': 'close'}, {'ps_lag': 0.1}],
+    ids=['wrong plug shape', 'air and flow the other way', 'lag'],
+)
+def test_a_foreign_valve_is_watched_without_alarm_and_its_fault_named(change):
+    build = foreign.random_valve(25, **change)
+    proposal = commissioned(build, 25)
+    assert proposal.verdict == 'ok', proposal.limiting
+    for fault in ('friction +100 %', 'spring -20 %'):
+        t = trial(build, proposal, fault, 25)
+        assert t.armed
+        assert t.false_alarms == 0
+        assert t.found
+        assert t.delay < 60.0
+        assert t.right, t.cause
+        assert np.isnan(t.size) or t.size == pytest.approx(t.true, rel=0.15)
