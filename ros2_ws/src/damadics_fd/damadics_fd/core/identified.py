@@ -5,7 +5,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from damadics_fd.core.record import Floats, Ints
+from damadics_fd.core.record import Floats, Ints, Plain
 
 OK, LIMITED, REFUSED = 'ok', 'limited', 'refused'
 VERDICTS = (OK, LIMITED, REFUSED)

@@ -2,18 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """What can be told of recordings before anything is fitted: units, directions, dead signals."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from damadics_fd.commands.commission.errors import CommissioningError
 from damadics_fd.commands.commission.signals import NEEDED, Blocks
 from damadics_fd.core.identified import FaultFree
 from damadics_fd.core.record import Floats
+from damadics_fd.core.result import Columns
 from damadics_fd.core.settings import Settings
 
-Columns = Mapping[str, NDArray]
 TRAVEL = 0.2  # of the stroke, at least
 CLEARLY, STRONGLY = 0.2, 0.5  # correlation from which a direction counts
 ROOM = 0.95  # of a range that may be used

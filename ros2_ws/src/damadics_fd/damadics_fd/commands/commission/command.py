@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.recording import Recording, find_recordings, parse_maps
@@ -17,6 +16,7 @@ from damadics_fd.commands.commission.monitor import identify
 from damadics_fd.commands.commission.plot import draw
 from damadics_fd.commands.commission.valve_file import parameter_file
 from damadics_fd.core.identified import REFUSED, FaultFree, Identified
+from damadics_fd.core.record import Floats, Ints
 from damadics_fd.core.settings import Settings, SettingsError
 from damadics_fd.store.references import Reference, save_reference
 
@@ -113,7 +113,7 @@ def read(recording: Recording, until: float | None = None) -> FaultFree:
     """
     chunks = list(recording.chunks(lambda text: print(f'commission: {text}', file=sys.stderr)))
     names = set.intersection(*(set(chunk) for chunk in chunks)) if chunks else set()
-    columns: dict[str, NDArray] = {
+    columns: dict[str, Floats | Ints] = {
         name: np.concatenate([chunk[name] for chunk in chunks]) for name in names
     }
     if 'stamp' not in columns and 'log_time' in columns:

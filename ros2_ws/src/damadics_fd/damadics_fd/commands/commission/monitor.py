@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Identify a valve for mode monitor: settings, verdict, and what they rest on."""
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,7 +30,7 @@ from damadics_fd.commands.commission.verdict import (
 )
 from damadics_fd.core.identified import LIMITED, OK, REFUSED, FaultFree, Identified
 from damadics_fd.core.monitor import run
-from damadics_fd.core.result import Result
+from damadics_fd.core.result import Columns, Result
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.signature.state import MIN_RATE
 
@@ -46,7 +46,7 @@ class Proposal:
     balance: Balance
     limit: Limit | None  # None where too little was monitored
     result: Result  # the recordings with the proposed settings
-    columns: Mapping[str, NDArray]  # of all recordings
+    columns: Columns  # of all recordings
     noise: float  # standard deviation of xi2 from sensor noise [1/s]
     minute: Found
     hour: Found
@@ -189,7 +189,7 @@ def _limited(
     return settings, limit, reasons
 
 
-def joined(recordings: Sequence[FaultFree]) -> dict[str, NDArray]:
+def joined(recordings: Sequence[FaultFree]) -> dict[str, NDArray[np.generic]]:
     """
     Put recordings one after the other, a minute apart.
 
@@ -208,7 +208,7 @@ def joined(recordings: Sequence[FaultFree]) -> dict[str, NDArray]:
     return columns
 
 
-def _flow(recordings: Sequence[FaultFree], signals: Signals) -> NDArray | None:
+def _flow(recordings: Sequence[FaultFree], signals: Signals) -> NDArray[np.float64] | None:
     """Return the flow of the blocks of a single recording, where it is measured."""
     if len(recordings) != 1 or 'flow' not in recordings[0].columns:
         return None
@@ -218,7 +218,8 @@ def _flow(recordings: Sequence[FaultFree], signals: Signals) -> NDArray | None:
     if good.mean() < 0.5:
         return None
     t = (np.asarray(columns['stamp'], np.int64) - int(columns['stamp'][0])) * 1e-9
-    return np.interp(blocks(signals, BLOCK).t, t[good], flow[good])
+    found: NDArray[np.float64] = np.interp(blocks(signals, BLOCK).t, t[good], flow[good])
+    return found
 
 
 def _same_valve(recordings: Sequence[FaultFree], base: Settings, given: Collection[str]) -> None:

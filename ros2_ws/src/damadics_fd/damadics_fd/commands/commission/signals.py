@@ -107,7 +107,7 @@ def gather(recordings: Sequence[FaultFree]) -> Signals:
     :return: the samples.
     :raises CommissioningError: where the rates of the recordings differ.
     """
-    rates = {r.name: sample_rate(r.columns['stamp']) for r in recordings}
+    rates = {r.name: sample_rate(np.asarray(r.columns['stamp'], np.int64)) for r in recordings}
     rate = float(np.median(list(rates.values())))
     odd = [f'{n} has {v:g} Hz' for n, v in rates.items() if abs(v / rate - 1.0) > RATES]
     if odd:

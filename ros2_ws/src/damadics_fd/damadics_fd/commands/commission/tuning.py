@@ -2,21 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """The constants of the approximator for a valve, by the rules for another actuator."""
 
-from collections.abc import Mapping
-
-from numpy.typing import NDArray
-
 from damadics_fd.commands.commission.balance import Balance
 from damadics_fd.core.approximator.estimator import Estimator
 from damadics_fd.core.monitor import Chain
+from damadics_fd.core.result import Columns
 from damadics_fd.core.settings import Settings
 
 BANDWIDTHS = (50.0, 25.0)  # rad/s, tried from the fast one on until the noise is low enough
 
 
-def tune(
-    columns: Mapping[str, NDArray], balance: Balance, base: Settings
-) -> tuple[Settings, float, list[str]]:
+def tune(columns: Columns, balance: Balance, base: Settings) -> tuple[Settings, float, list[str]]:
     """
     Set the constants by the rules for another actuator.
 
