@@ -23,8 +23,9 @@ setup(
     license='Apache-2.0',
     extras_require={
         'test': ['pytest', 'hypothesis'],
-        'report': ['jinja2', 'matplotlib'],
-        'baselines': ['river', 'filterpy', 'scikit-learn'],
+        'report': ['jinja2', 'markupsafe', 'matplotlib', 'pillow'],
+        'parquet': ['pyarrow'],
+        'baselines': ['river', 'filterpy', 'scikit-learn', 'scipy'],
         'cluster': ['dask[distributed]'],
     },
     entry_points={'console_scripts': ['evaluate = damadics_evaluate:main']},

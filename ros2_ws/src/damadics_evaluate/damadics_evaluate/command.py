@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 from damadics_evaluate.baselines import DETECTORS, MissingPackageError
+from damadics_evaluate.baselines.classifiers import train
 from damadics_evaluate.benchmark.campaign import Campaign
 from damadics_evaluate.benchmark.runner import admit, read_results, run_campaign
 from damadics_evaluate.benchmark.tables import compare, write_csv
@@ -159,6 +160,7 @@ def _run(arguments: argparse.Namespace) -> None:
         isolated_seeds=arguments.isolated_seeds,
     )
     campaign = admit(campaign, _tell)
+    train(_tell, campaign.detectors)
     results = run_campaign(campaign, arguments.out, arguments.jobs, arguments.scheduler)
     for reason in dict.fromkeys(r['reason'] for r in results if r['kind'] == 'refused'):
         _tell(f'refused: {reason}')

@@ -2,9 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Detectors under test: the SCADA-rate monitor and what a user would pick instead."""
 
+from damadics_evaluate.baselines.classifiers import Forest, Network
+from damadics_evaluate.baselines.coherency import Coherency
 from damadics_evaluate.baselines.drift import Adwin, PageHinkley
 from damadics_evaluate.baselines.kalman import InnovationEkf
 from damadics_evaluate.baselines.multivariate import IsolationForest, PrincipalComponents
+from damadics_evaluate.baselines.narx import NarxHotelling
 from damadics_evaluate.baselines.residuals import (
     CusumOnDeviation,
     Ewma,
@@ -31,6 +34,10 @@ DETECTORS: dict[str, type[Detector]] = {
         Adwin,
         PrincipalComponents,
         IsolationForest,
+        Coherency,
+        NarxHotelling,
+        Forest,
+        Network,
         ModelThreshold,
         FlowThreshold,
     )

@@ -5,10 +5,11 @@
 import hashlib
 import json
 import platform
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from importlib.metadata import PackageNotFoundError, version
 
 from damadics_evaluate.baselines import DETECTORS
+from damadics_evaluate.benchmark.results import Result
 from damadics_evaluate.detectors.find import find_detector
 from damadics_evaluate.scenarios.cases import SCENARIOS, case
 from damadics_evaluate.scenarios.trajectories import NOISE
@@ -60,6 +61,13 @@ class Campaign:
         for name in ('calibration_days', 'debounce'):
             if getattr(self, name) < 1:
                 raise ValueError(f'{name} is {getattr(self, name)}: give 1 or more')
+
+    @classmethod
+    def of_manifest(cls, stated: Result) -> 'Campaign':
+        """Return the campaign that a manifest states; settings of other versions are left out."""
+        names = {item.name for item in fields(cls)}
+        plain = {k: tuple(v) if isinstance(v, list) else v for k, v in stated.items()}
+        return cls(**{k: v for k, v in plain.items() if k in names})
 
     def settings_hash(self, detector: str) -> str:
         """Return a hash of everything but scenario and seed that shapes a detector's results."""

@@ -185,6 +185,8 @@ def _scada() -> dict[str, Alarms]:
     from damadics_plant.scenarios.sources import Steps
 
     base: Scenario = load_scenario(RUNS[0])
+    if not isinstance(base.cv, Steps):
+        raise TypeError(f'{RUNS[0]}: its control value is no sequence of steps')
     times, values = base.cv.times, base.cv.values
     cycles = range(REPEATS)
     cv = Steps(

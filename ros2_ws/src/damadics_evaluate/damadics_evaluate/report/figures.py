@@ -84,8 +84,8 @@ def delay_curves(results: Sequence[Result], detectors: Sequence[str]) -> str:
                 continue
             share = np.arange(1, len(values) + 1) / len(values)
             x = [max(t, 0.7) for t in values if math.isfinite(t)]
-            kept = np.unique(np.linspace(0, len(x) - 1, STEPS).astype(int)) if x else []
-            x, share = [x[i] for i in kept], share[list(kept)]
+            kept = np.unique(np.linspace(0, max(len(x) - 1, 0), STEPS).astype(int))[: len(x)]
+            x, share = [x[i] for i in kept], share[kept]
             axis.step(
                 [0.5, *x, 1e5],
                 [0.0, *share, share[-1] if x else 0.0],
@@ -181,7 +181,8 @@ def detectability(results: Sequence[Result], detector: str = 'scada') -> str:
             xlabel='strength of the abrupt fault',
             ylabel='median delay (s)',
         )
-        axis.legend(ncol=2, loc='upper left', bbox_to_anchor=(1.02, 1.0))
+        if points:
+            axis.legend(ncol=2, loc='upper left', bbox_to_anchor=(1.02, 1.0))
 
     return _draw((8.6, 4.4), draw)
 

@@ -47,9 +47,7 @@ def write_report(source: Path, target: Path) -> list[Path]:
     if not any(r['kind'] == 'scenario' for r in results):
         raise ValueError(f'{source} holds no scenario: run evaluate run --out {source}')
     manifest = json.loads((source / MANIFEST).read_text(encoding='utf-8'))
-    stated = manifest['campaign']
-    plain = {k: tuple(v) if isinstance(v, list) else v for k, v in stated.items()}
-    content = _content(Campaign(**plain), results)
+    content = _content(Campaign.of_manifest(manifest['campaign']), results)
     for key, name in (('paper', PAPER), ('lublin', LUBLIN)):
         file = source / name
         content[key] = json.loads(file.read_text(encoding='utf-8')) if file.exists() else None

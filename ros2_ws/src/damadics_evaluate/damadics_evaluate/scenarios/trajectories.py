@@ -44,7 +44,7 @@ def cache_directory() -> Path:
 
 
 @cache
-def _plant_hash() -> str:
+def plant_hash() -> str:
     """Return a hash of the plant's source, so that another plant makes new trajectories."""
     digest_of_sources = hashlib.sha256()
     for folder in (plant_path[0], valve.__path__[0]):
@@ -67,7 +67,7 @@ def trajectory(name: str, duration: int, plant_seed: int) -> tuple[Floats, Float
     if own:
         place = hashlib.sha256(name.encode()).hexdigest()[:8]
         stem = f'{stem}_{place}_{digest(name.removesuffix(FREE_OF_FAULTS))}'
-    directory = cache_directory() / 'trajectories' / _plant_hash()
+    directory = cache_directory() / 'trajectories' / plant_hash()
     file = directory / f'{stem}_{duration}_{plant_seed}.npy'
     if file.exists():
         stored = np.load(file)
