@@ -30,6 +30,8 @@ DISTRIBUTIONS = {
     'yaml': 'pyyaml',
     'google': 'protobuf',
     'prometheus_client': 'prometheus-client',
+    'fpdf': 'fpdf2',
+    'paho': 'paho-mqtt',
 }
 KEYS = {'PIL': 'python3-pil', 'dask': 'python3-dask'}
 IMPLIED = {'rosidl_default_runtime', 'ros2cli', 'ros2launch'}  # run, never imported
