@@ -158,7 +158,7 @@ def test_a_foreign_stack_reads_and_hears_the_same(served):
     detectors.judge('lv101', FaultEvent.RAISED, 'friction up')
     out, problem = reader.communicate(timeout=60)
     assert reader.returncode == 0, problem
-    told = json.loads(out.splitlines()[-1])
+    told = json.loads(next(line for line in out.splitlines() if line.startswith('{')))
     assert told['browse'] == 'LV101' and told['type'] == 'PADIMType'
     assert told['event']['message'] == 'friction up'
     assert told['event']['active'] is True and told['event']['acknowledged'] is False

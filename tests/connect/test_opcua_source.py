@@ -234,7 +234,7 @@ def test_every_mistake_in_a_configuration_is_told_at_once(domain, tmp_path):
         'user.password stands in the file: give password_file or password_env instead',
         'perod: there is no such entry: do you mean period?',
         'a name consists of small letters',
-        "'furlong' is no unit of x1",
+        'x1 cannot be in [furlong]',
         'there is no signal zz',
         'valves.lv2.period is not a number',
         'valves.lv2.signals.cv.node is missing',

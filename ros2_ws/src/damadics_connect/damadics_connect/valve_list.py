@@ -5,11 +5,12 @@
 import re
 from typing import NamedTuple
 
+from damadics_fd.bag.mapping import Scale
 from damadics_fd.core.sample import SIGNALS
 
 from damadics_connect.publishing import ValveName
 from damadics_connect.settings import Section
-from damadics_connect.units import Scale, read_scale
+from damadics_connect.units import read_scale, read_source
 
 NAME = re.compile(r'[a-z][a-z0-9_]*(/[a-z][a-z0-9_]*)*')
 SHORTEST, LONGEST = 0.001, 3600.0  # s
@@ -30,7 +31,7 @@ class ValveSource(NamedTuple):
     actuator: str
     period: float  # s
     signals: tuple[Signal, ...]
-    topic: str = ''  # of a broker
+    place: str = ''  # a topic or file of its own
 
     @property
     def known_as(self) -> ValveName:
@@ -38,13 +39,13 @@ class ValveSource(NamedTuple):
         return ValveName(self.name, self.actuator)
 
 
-def read_valves(config: Section, what: str, *, with_topic: bool = False) -> list[ValveSource]:
+def read_valves(config: Section, what: str, *, place: str = '') -> list[ValveSource]:
     """
     Read the entry `valves` of a configuration.
 
     :param config: the whole file.
     :param what: the word for the source of a signal, such as `node`.
-    :param with_topic: each valve has an entry `topic`.
+    :param place: the entry of each valve that says where its samples are, such as `topic`.
     :return: the valves in the order of the file; mistakes are noted in `config`.
     """
     period = config.number('period', 1.0, SHORTEST, LONGEST)
@@ -55,30 +56,25 @@ def read_valves(config: Section, what: str, *, with_topic: bool = False) -> list
                 f'valves.{name[:40]}: a name consists of small letters, digits and _, '
                 'such as lv101'
             )
-        signals = []
-        for signal, given in _signals(entry, what).items():
-            source = given.needed(what, 'ns=2;s=...' if what == 'node' else signal)
-            signals.append(Signal(SIGNALS.index(signal), source, read_scale(given, signal)))
-            given.done()
         found.append(
             ValveSource(
                 name,
                 entry.text('actuator', name),
                 entry.number('period', period, SHORTEST, LONGEST),
-                tuple(signals),
-                entry.text('topic') if with_topic else '',
+                tuple(_signals(entry, what)),
+                entry.text(place) if place else '',
             )
         )
         entry.done()
     return found
 
 
-def _signals(entry: Section, what: str) -> dict[str, Section]:
-    """Read the signals of a valve; `x1: NODE` is short for `x1: {node: NODE}`."""
+def _signals(entry: Section, what: str) -> list[Signal]:
+    """Read the signals of a valve; `x1: SOURCE[UNIT]` is short for a mapping."""
     given = entry.mapping('signals')
     if not given:
         entry.problems.append(f'{entry.where}.signals: name at least cv and x1')
-    found = {}
+    found = []
     for name, content in given.items():
         if name not in SIGNALS:
             entry.problems.append(
@@ -86,7 +82,14 @@ def _signals(entry: Section, what: str) -> dict[str, Section]:
                 f'there are {", ".join(SIGNALS)}'
             )
             continue
-        content = content if isinstance(content, dict) else {what: content}
-        where = f'{entry.where}.signals.{name}'
-        found[name] = Section(content, where, entry.problems, entry.folder)
+        where = f'{entry.where}.signals'
+        if isinstance(content, str):
+            section = Section({}, where, entry.problems)
+            source, scale = read_source(section, name, content)
+        else:
+            section = Section(content, f'{where}.{name}', entry.problems, entry.folder)
+            source = section.needed(what, 'ns=2;s=...' if what == 'node' else name)
+            scale = read_scale(section, name)
+            section.done()
+        found.append(Signal(SIGNALS.index(name), source, scale))
     return found

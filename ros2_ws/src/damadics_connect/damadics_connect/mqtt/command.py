@@ -66,13 +66,13 @@ async def connect(path: Path, ros_args: list[str]) -> int:
 
     config = read_config(path)
     broker = read_broker(config)
-    valves = read_valves(config, 'field', with_topic=True)
+    valves = read_valves(config, 'field', place='topic')
     stamp = config.section('stamp')
     field = stamp.text('field', 'stamp'), stamp.text('unit', 'ns', choices=(*UNITS, 'iso'))
     stamp.done()
     publish = config.text('publish', 'topics', choices=('topics', 'blocks'))
     for valve in valves:
-        _check_topic(config, valve.name, valve.topic)
+        _check_topic(config, valve.name, valve.place)
     out, prefix, edge = _read_out(config)
     if not valves and not out:
         config.problems.append('give valves (samples in), out (judgements out) or both')

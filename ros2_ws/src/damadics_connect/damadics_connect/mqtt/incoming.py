@@ -81,7 +81,7 @@ class Incoming:
         for number, source in enumerate(valves):
             valve = Valve(source, partial(output.send, number))
             self._all[source.name] = valve
-            self._valves.setdefault(source.topic, []).append(valve)
+            self._valves.setdefault(source.place, []).append(valve)
         self._sequence: dict[str, int] = {}
         self._asked: dict[str, float] = {}
         self._fault = 'not connected yet'
