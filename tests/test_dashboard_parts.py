@@ -12,12 +12,12 @@ from damadics_dashboard.dashboard import main, read_tokens
 from damadics_dashboard.live.raw import Batch
 from damadics_dashboard.live.traces import NANO, Trace, envelope
 from damadics_dashboard.live.valve import Valve
-from damadics_dashboard.pages.elements import TEMPLATES, render
 from damadics_dashboard.pages.fleet_page import tile
-from damadics_dashboard.pages.history_page import cell
 from damadics_dashboard.server.access import COOKIE, Guard, check_binding
 from damadics_dashboard.server.limits import SizeLimit
+from damadics_dashboard.store.export import cell
 from damadics_dashboard.store.history import History, Wanted
+from damadics_dashboard.words.templates import TEMPLATES, render
 from damadics_dashboard.words.texts import texts
 from damadics_fd.store.access import Access, AccessError, Grant, Role
 from damadics_msgs.msg import FaultEvent, FaultFlag, Measurement

@@ -28,6 +28,7 @@ setup(
     entry_points={
         'console_scripts': [
             'demo = damadics_bringup.demo:main',
+            'init = damadics_bringup.init:main',
             'policy = damadics_bringup.policy:main',
             'run = damadics_bringup.launcher:main',
         ]

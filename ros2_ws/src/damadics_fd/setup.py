@@ -38,6 +38,7 @@ setup(
             'verify = damadics_fd.commands.verify:main',
             'recover = damadics_fd.commands.recover:main',
             'commission = damadics_fd.commands.commission.command:main',
+            'settings = damadics_fd.commands.settings:main',
         ],
     },
 )

@@ -4,38 +4,14 @@
 
 import json
 from collections.abc import Callable
-from functools import cache
-from pathlib import Path
 from typing import TypeVar
 
-from jinja2 import ChainableUndefined, Environment, FileSystemLoader, select_autoescape
 from nicegui import ui
 
-TEMPLATES = Path(__file__).parent / 'templates'
+from damadics_dashboard.words.templates import render
+
 E = TypeVar('E', bound=ui.element)
 Plain = str | int | float | bool | None
-
-
-@cache
-def _environment() -> Environment:
-    return Environment(
-        loader=FileSystemLoader(TEMPLATES),
-        autoescape=select_autoescape(default=True),
-        undefined=ChainableUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-
-
-def render(template: str, **values: object) -> str:
-    """
-    Fill in a template; every value is escaped by the template engine.
-
-    :param template: name of its file in `templates`.
-    :param values: what it shows.
-    :return: HTML.
-    """
-    return _environment().get_template(template).render(**values)
 
 
 def markup(template: str, **values: object) -> ui.html:

@@ -14,6 +14,7 @@ from damadics_dashboard.live.watcher import Watcher
 from damadics_dashboard.pages.elements import box, button, markup, redraw, with_values
 from damadics_dashboard.pages.frame import card, frame, grant, keep_user, may_operate, user_name
 from damadics_dashboard.pages.valve_words import TRANSITIONS, address, history_rows
+from damadics_dashboard.store.export import cell
 from damadics_dashboard.store.history import ACTION_COLUMNS, COLUMNS, Wanted
 from damadics_dashboard.words.texts import Texts
 
@@ -166,18 +167,3 @@ def _export(watcher: Watcher, wanted: Wanted, t: Texts) -> None:
         rest = (cell(row[name]) for name in ACTION_COLUMNS if name not in COLUMNS)
         table.writerow(('action', *common, *rest))
     ui.download.content(stream.getvalue().encode('utf-8-sig'), 'history.csv', 'text/csv')
-
-
-def cell(value: object) -> object:
-    """
-    Return a value as a cell: a text that a spreadsheet would run as a formula is quoted.
-
-    :param value: number or text.
-    :return: the same, or a text that begins with an apostrophe.
-
-    >>> cell('=1+1'), cell(-2.0)
-    ("'=1+1", -2.0)
-    """
-    if isinstance(value, str) and value[:1] in ('=', '+', '-', '@', '\t', '\r'):
-        return f"'{value}"
-    return value

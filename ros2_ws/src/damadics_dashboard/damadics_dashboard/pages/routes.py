@@ -78,7 +78,9 @@ def _report(sources: content.Sources, name: str, days: int, kind: str, t: Texts)
         report = content.valve_report(sources, name, since, until, t)
     body: str | bytes
     if kind == 'pdf':
-        body = forms.pdf(report, t)
+        from damadics_dashboard.report.paper import pdf  # an extra, and slow to load
+
+        body = pdf(report, t)
     else:
         body = forms.html(report, t) if kind == 'html' else forms.text_csv(report)
     file = f"inline; filename*=UTF-8''report_{quote(name or 'valve', safe='')}.{kind}"

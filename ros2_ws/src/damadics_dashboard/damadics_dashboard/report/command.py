@@ -8,11 +8,15 @@ import sys
 import time
 from datetime import datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from damadics_fd.ros.arguments import command_parser, split_ros_args, state_folder
 from damadics_fd.store.file_names import file_name
 
-from damadics_dashboard.words.texts import LANGUAGES, texts
+from damadics_dashboard.words.texts import LANGUAGES, Texts, texts
+
+if TYPE_CHECKING:
+    from damadics_dashboard.report.content import Report
 
 DAY = 86400.0
 FORMS = ('html', 'pdf', 'csv')
@@ -127,13 +131,22 @@ def write(options: argparse.Namespace, since: float, until: float) -> list[Path]
     for form in options.forms:
         path = options.out / f'report_{file_name(options.what)}.{form}'
         if form == 'pdf':
-            path.write_bytes(forms.pdf(report, t))
+            path.write_bytes(_pdf(report, t))
         elif form == 'html':
             path.write_text(forms.html(report, t), 'utf-8')
         else:
             path.write_text(forms.text_csv(report), 'utf-8-sig')
         written.append(path)
     return written
+
+
+def _pdf(report: 'Report', t: Texts) -> bytes:
+    """Return the PDF, or say what it needs."""
+    try:
+        from damadics_dashboard.report.paper import pdf
+    except ImportError as problem:
+        raise ValueError(f'PDF needs fpdf2 ({problem}): pip install fpdf2, or --as html') from None
+    return pdf(report, t)
 
 
 if __name__ == '__main__':

@@ -1,0 +1,130 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Reports: a valve and a fleet over a period, as people take them away."""
+
+import csv
+import io
+import math
+import resource
+import time
+
+import pytest
+from damadics_dashboard.report.command import main
+from damadics_dashboard.report.content import alarms_of, reliability
+from damadics_dashboard.store.history import History
+from damadics_fd.store.intervals import DAY, Intervals
+from damadics_msgs.msg import FaultEvent
+
+pypdf = pytest.importorskip('pypdf')
+END = 1_790_000_000.0  # s
+BEGIN = END - 365 * DAY
+
+
+def event(valve: str, seen: float, transition: int, **values) -> dict:
+    row = {
+        'valve': valve, 'stamp': int(seen * 1e9), 'transition': transition, 'occurrence': 1,
+        'level': 1, 'onset': int(seen * 1e9), 'residual': 0.4, 'threshold': 0.2, 'ratio': 2.0,
+        'duration': 1.0, 'cause': '', 'confidence': None, 'strength': None, 'text': 'raised',
+        'advice': '',
+    }  # fmt: skip
+    return {**row, **values}
+
+
+@pytest.fixture(scope='module')
+def year(tmp_path_factory):
+    """A valve-year: a point every quarter of an hour, friction that grows, two alarms."""
+    state = tmp_path_factory.mktemp('state')
+    trends = Intervals(state / 'trends.sqlite')
+    step = 6 * 3600
+    for k in range(0, 365 * DAY, step):
+        share = k / (365 * DAY)
+        values = {'friction': 1.65 * share, 'spring': 0.01 * math.sin(9 * share), 'preload': 2.0}
+        trends.add('lv101', BEGIN + k, values, {'friction': 0.02, 'spring': 0.001})
+    trends.close()
+    history = History(state / 'history.sqlite')
+    with pytest.MonkeyPatch.context() as patch:
+        for valve, day, kind, more in (
+            ('lv101', 100, FaultEvent.RAISED, {}),
+            ('lv101', 101, FaultEvent.CLEARED, {}),
+            ('lv101', 360, FaultEvent.RAISED, {}),
+            ('lv101', 360.1, FaultEvent.CHANGED,
+             {'cause': 'friction_up', 'strength': 1.65, 'confidence': 0.99}),
+            ('lv102', 200, FaultEvent.RAISED, {'level': 4}),
+        ):  # fmt: skip
+            seen = BEGIN + day * DAY
+            patch.setattr(time, 'time', lambda seen=seen: seen)
+            history.add(event(valve, seen, kind, **more))
+        patch.setattr(time, 'time', lambda: BEGIN + 361 * DAY)
+        action = {'valve': 'lv101', 'action': 'acknowledge', 'user': 'Anna', 'role': 'operator'}
+        history.add_action({**action, 'comment': '<b>=1+1</b>', 'done': 1, 'result': 'done'})
+    history.close()
+    return state
+
+
+def report(state, out, *words) -> int:
+    stamp = time.strftime('%Y-%m-%dT%H:%M:%S', time.localtime(BEGIN))
+    until = time.strftime('%Y-%m-%dT%H:%M:%S', time.localtime(END))
+    common = ['--from', stamp, '--to', until, '--state', str(state), '--out', str(out)]
+    return main([*words, *common])
+
+
+def test_a_valve_year_tells_cause_size_dates_and_who_did_what(year, tmp_path, capsys):
+    began, before = time.process_time(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    assert report(year, tmp_path, 'lv101') == 0
+    seconds = time.process_time() - began
+    grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
+    lines = capsys.readouterr().out.splitlines()
+    print(f'report of a valve-year: {seconds:.1f} s, {grown:.0f} MB more')
+    assert grown < 200.0 and seconds < 20.0  # of a core; others may load the machine
+    pages = pypdf.PdfReader(tmp_path / 'report_lv101.pdf').pages
+    text = '\n'.join(page.extract_text() for page in pages)
+    for wanted in ('lv101', 'Friction is 2.6 times normal.', '+165%', 'Check the packing', 'Anna'):
+        assert wanted in text, wanted
+    assert time.strftime('%Y-%m-%d', time.localtime(BEGIN)) in text
+    assert 'Limit +300 % in about' in text.replace('\n', ' ')
+    html = (tmp_path / 'report_lv101.html').read_text()
+    assert '&lt;b&gt;=1+1' in html and '<b>=1+1' not in html
+    assert 'http' not in html.replace('http-equiv', ''), 'it needs nothing else'
+    rows = list(
+        csv.DictReader(io.StringIO((tmp_path / 'report_lv101.csv').read_text('utf-8-sig')))
+    )
+    assert [row['cause'] for row in rows] == ['friction_up', '', '', '']
+    assert len(lines) == 3
+
+
+def test_the_fleet_lists_the_worst_first_and_counts_by_eemua(year, tmp_path):
+    assert report(year, tmp_path, 'FLEET', '--as', 'pdf') == 0
+    text = pypdf.PdfReader(tmp_path / 'report_FLEET.pdf').pages[0].extract_text()
+    assert text.index('lv102') < text.index('lv101'), 'a failure comes before maintenance'
+    assert 'EEMUA 191' in text
+
+
+def test_german(year, tmp_path):
+    assert report(year, tmp_path, 'lv101', '--as', 'pdf', '--language', 'de') == 0
+    text = pypdf.PdfReader(tmp_path / 'report_lv101.pdf').pages[0].extract_text()
+    assert 'Die Reibung beträgt das 2,6-Fache des Normalen.' in text
+
+
+@pytest.mark.parametrize(
+    ('words', 'said'),
+    [
+        (['lv_101'], 'do you mean lv101?'),
+        (['lv101', '--from', 'yesterday'], 'is no date'),
+        (['lv101', '--from', '2026-02-01', '--to', '2026-01-01'], 'ends before it begins'),
+        (['lv101', '--state', 'nowhere'], 'there is no history'),
+    ],
+)
+def test_what_cannot_be_is_refused_with_a_remedy(year, tmp_path, words, said, capsys):
+    assert main(['--state', str(year), '--out', str(tmp_path), *words]) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_times_between_and_to_clearing():
+    rows = [
+        {**event('v', seen, kind), 'seen': seen}
+        for seen, kind in ((100.0, FaultEvent.RAISED), (160.0, FaultEvent.CLEARED))
+    ]
+    alarms = alarms_of(rows[::-1])
+    assert reliability(alarms, 1000.0) == (940.0, 60.0)
+    mtbf, mttr = reliability([], 1000.0)
+    assert math.isinf(mtbf) and math.isnan(mttr)
