@@ -2,16 +2,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """The black box: the last seconds in memory, written when a fault is flagged."""
 
+import shutil
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
+from damadics_fd.bag.bag_writer import NANO, BagWriter
 from damadics_fd.bag.cdr.definition import parse_definition, schema_text
 from damadics_fd.bag.cdr.layout import layout_of
 from damadics_fd.bag.errors import BagError
+from damadics_fd.bag.latched import Kept, Latched
 from damadics_fd.bag.rosbag2 import QosProfile, Topic
-from damadics_fd.bag.writer import NANO, BagWriter
 
 FLAG = 'damadics_msgs/msg/FaultFlag'
 MOST_BYTES = 1 << 29  # held in memory, whatever the seconds
@@ -20,17 +22,32 @@ MOST_EVENTS = 8  # written at the same time
 
 @dataclass
 class Event:
-    """A bag that is being written."""
+    """
+    What surrounds a fault.
 
-    bag: BagWriter
-    end: int  # [ns] log time
+    :param flag: name of the topic that flagged it.
+    :param at: log time of the flag [ns].
+    :param end: log time of the last message that belongs to it [ns].
+    :param waiting: messages not yet in the bag.
+    :param bag: the bag, None as long as the disk does not take one.
+    :param over: its last message has come.
+    """
+
+    flag: str
+    at: int
+    end: int
+    waiting: deque[Kept] = field(default_factory=deque)
+    bag: BagWriter | None = None
+    over: bool = False
 
 
 class BlackBox:
     """
     Hold the last messages of all topics; write a bag from before until after each fault.
 
-    It stands where a `BagWriter` stands. A fault is the rise of `fault` in any `FaultFlag`.
+    It stands where a `BagWriter` stands. A fault is the rise of `fault` in any `FaultFlag`. Its
+    messages wait in memory while the disk is full, and an `OSError` is retried by `flush`.
+    Latched messages from before stand at the head of each bag.
 
     :param path: directory in which each event gets its bag `event_000`, `event_001`, ...
     :param before: seconds before the flag that are kept.
@@ -40,9 +57,11 @@ class BlackBox:
 
     def __init__(self, path: str | Path, before: float, after: float):
         self.path = Path(path)
+        self.missed = 0  # faults beyond those that can be written at the same time
         self._before, self._after = int(before * NANO), int(after * NANO)
-        self._ring: deque[tuple[Topic, bytes, int, int]] = deque()
+        self._ring: deque[Kept] = deque()
         self._bytes = 0
+        self._latched = Latched()
         self._topics: dict[str, Topic] = {}
         self._faults: dict[str, bool] = {}
         self._active: list[Event] = []
@@ -64,17 +83,20 @@ class BlackBox:
         return self._topics[name]
 
     def write(self, topic: Topic, data: bytes, log_time: int, publish_time: int) -> None:
-        """Take one message."""
-        self._ring.append((topic, data, log_time, publish_time))
+        """Take one message; what a full disk does not take waits in memory."""
+        message = Kept(topic, data, log_time, publish_time)
+        self._ring.append(message)
         self._bytes += len(data)
-        while self._ring[0][2] < log_time - self._before or self._bytes > MOST_BYTES:
-            self._bytes -= len(self._ring.popleft()[1])
+        while self._ring[0].log_time < log_time - self._before or self._bytes > MOST_BYTES:
+            self._bytes -= len(self._ring[0].data)
+            self._latched.keep(self._ring.popleft())
         for event in self._active:
-            event.bag.write(_declared(event.bag, topic), data, log_time, publish_time)
-        if self._active and log_time >= self._active[0].end:
-            self._finish(self._active.pop(0))
-        if topic.type == FLAG and self._rises(topic, data) and len(self._active) < MOST_EVENTS:
+            if not event.over:
+                event.waiting.append(message)
+                event.over = log_time >= event.end
+        if topic.type == FLAG and self._rises(topic, data):
             self._begin(topic, log_time)
+        self._drain()
 
     def _rises(self, topic: Topic, data: bytes) -> bool:
         definition = parse_definition(FLAG, schema_text(FLAG))
@@ -85,53 +107,97 @@ class BlackBox:
         return fault and not before
 
     def _begin(self, flag: Topic, log_time: int) -> None:
+        """Note a fault before anything is tried that may fail."""
+        if len(self._active) >= MOST_EVENTS:
+            self.missed += 1
+            return
+        first = self._ring[0].log_time
+        event = Event(flag.name, log_time, log_time + self._after)
+        event.waiting += [kept._replace(log_time=first) for kept in self._latched.before(first)]
+        event.waiting += self._ring
+        self._active.append(event)
+
+    def _drain(self) -> None:
+        """Write what waits and close what is over."""
+        for event in list(self._active):
+            event.bag = event.bag or self._open(event)
+            while event.waiting:
+                message = event.waiting.popleft()
+                topic = message.topic
+                event.bag.write(_declared(event.bag, topic), *message[1:])
+            if event.over:
+                self._finish(event)
+
+    def _open(self, event: Event) -> BagWriter:
         while (path := self.path / f'event_{self._number:03d}').exists():
             self._number += 1
-        bag = BagWriter(path, custom_data={'flag': flag.name, 'flagged_at_ns': str(log_time)})
+        about = {'flag': event.flag, 'flagged_at_ns': str(event.at)}
+        try:
+            bag = BagWriter(path, custom_data=about)
+        except (OSError, BagError):
+            shutil.rmtree(path, ignore_errors=True)  # made just now, and empty
+            raise
         for topic in self._topics.values():
             _declared(bag, topic)
-        for topic, data, logged, published in self._ring:
-            bag.write(_declared(bag, topic), data, logged, published)
-        self._active.append(Event(bag, log_time + self._after))
+        return bag
 
     def _finish(self, event: Event) -> None:
-        event.bag.close()
-        self._size += event.bag.size
-        for name, count in event.bag.counts.items():
-            self._written[name] = self._written.get(name, 0) + count
+        if event.bag:
+            event.bag.close()
+            self._size += event.bag.size
+            for name, count in event.bag.counts.items():
+                self._written[name] = self._written.get(name, 0) + count
+        self._active.remove(event)
 
     def flush(self) -> None:
         """Hand all messages of open bags to the operating system."""
+        self._drain()
         for event in self._active:
-            event.bag.flush()
+            if event.bag:
+                event.bag.flush()
 
     def flush_if_due(self) -> None:
         """Flush open bags whose oldest message waits too long."""
         for event in self._active:
-            event.bag.flush_if_due()
+            if event.bag:
+                event.bag.flush_if_due()
 
     def drop_oldest(self) -> bool:
         """Tell that nothing can be removed: bags of faults are kept."""
         return False
 
     @property
+    def unsaved(self) -> int:
+        """Messages of faults that are in memory only."""
+        return sum(
+            len(event.waiting) + (event.bag.unsaved if event.bag else 0) for event in self._active
+        )
+
+    def abandon(self) -> None:
+        """Let go of bags that cannot be finished; their whole chunks stay readable."""
+        for event in self._active:
+            if event.bag:
+                event.bag.abandon()
+
+    @property
     def size(self) -> int:
         """Bytes in all bags."""
-        return self._size + sum(event.bag.size for event in self._active)
+        return self._size + sum(event.bag.size for event in self._active if event.bag)
 
     @property
     def counts(self) -> dict[str, int]:
         """Messages in all bags, by topic."""
         counts = dict.fromkeys(self._topics, 0) | self._written
         for event in self._active:
-            for name, count in event.bag.counts.items():
+            for name, count in event.bag.counts.items() if event.bag else ():
                 counts[name] = counts.get(name, 0) + count
         return counts
 
     def close(self) -> None:
         """Finish the bags that are open."""
-        while self._active:
-            self._finish(self._active.pop(0))
+        self._drain()
+        for event in list(self._active):
+            self._finish(event)
 
 
 def _declared(bag: BagWriter, topic: Topic) -> Topic:

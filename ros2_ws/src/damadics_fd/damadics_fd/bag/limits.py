@@ -14,8 +14,9 @@ class Limits:
     :param chunk: decompressed chunk [B].
     :param messages: in one chunk.
     :param ratio: decompressed over compressed size of a chunk; zstd cannot exceed it by much.
-    :param total: all chunks of a file, decompressed: so many bytes whatever its size,
-    :param total_ratio: and so many more for each byte of the file. Our writer stays below.
+    :param dense: a chunk that holds more bytes for each of its compressed ones is dense; our
+        writer writes none.
+    :param total: all dense chunks of a file together, decompressed [B].
     :param text: all schemas, channels and metadata together [B].
     :param channels: in one file.
     :param attachments: attachments and metadata records in one file.
@@ -29,8 +30,8 @@ class Limits:
     chunk: int = 1 << 28
     messages: int = 1 << 22
     ratio: int = 1 << 17
-    total: int = 1 << 32
-    total_ratio: int = 1000
+    dense: int = 300
+    total: int = 3 << 29
     text: int = 1 << 26
     channels: int = 10_000
     attachments: int = 100_000

@@ -6,10 +6,10 @@ import threading
 import time
 from collections import deque
 
+from damadics_fd.bag.bag_writer import BagWriter
 from damadics_fd.bag.blackbox import BlackBox
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.rosbag2 import Topic
-from damadics_fd.bag.writer import BagWriter
 
 Item = tuple[Topic, bytes, int, int]  # topic, serialised message, log and publish time [ns]
 
@@ -37,6 +37,7 @@ class Spool:
         self.dropped = 0
         self.error = ''  # why nothing can be written at present
         self.taken = 0  # messages handed to the bag
+        self.lost_of_taken = 0  # those that the disk refused when the bag was closed
         self._rotate = rotate
         self._most_waiting = most_waiting
         self._queue: deque[Item] = deque()
@@ -76,21 +77,38 @@ class Spool:
                 self.bag.write(*message)
             self.bag.flush_if_due()
         except (OSError, BagError) as error:
-            reason = error.strerror if isinstance(error, OSError) else error.reason
-            self.error = f'{reason} ({self.bag.path})'
+            self._fail(error)
             return self._rotate and self.bag.drop_oldest()
         return True
+
+    def _fail(self, error: OSError | BagError) -> None:
+        reason = error.strerror if isinstance(error, OSError) else error.reason
+        self.error = f'{reason} ({self.bag.path})'
+
+    @property
+    def written(self) -> int:
+        """Messages in the files of the bag."""
+        return sum(self.bag.counts.values()) - self.lost_of_taken
 
     def close(self) -> None:
         """
         Write everything that is queued and finish the bag.
 
-        :raises OSError: where the disk refuses; finished chunks stay readable.
+        Where the disk refuses, `error` says why and `dropped` how many messages are lost;
+        finished chunks stay readable.
         """
         self._stop.set()
         self._thread.join()
         while self._queue:
             if not self._drain():
-                self.dropped += len(self._queue)
                 break
-        self.bag.close()
+        try:
+            self.bag.close()
+            self.error = ''
+        except (OSError, BagError) as error:
+            self._fail(error)
+            self.dropped += self.bag.unsaved
+            self.lost_of_taken = self.bag.unsaved
+            self.bag.abandon()
+        self.dropped += len(self._queue)
+        self._queue.clear()

@@ -6,6 +6,8 @@ import io
 import os
 from pathlib import Path
 
+BLOCK = 1 << 20  # [B] copied at a time
+
 
 class WholeWrites(io.RawIOBase):
     """
@@ -16,7 +18,8 @@ class WholeWrites(io.RawIOBase):
     """
 
     def __init__(self, path: Path):
-        self._fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+        self.path = path
+        self._fd = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
         self._end = 0
 
     def writable(self) -> bool:
@@ -36,6 +39,28 @@ class WholeWrites(io.RawIOBase):
             raise
         self._end += done
         return done
+
+    def restore(self) -> bool:
+        """
+        Write the file anew where somebody has removed it or its folder.
+
+        :return: True where it was gone.
+        """
+        if self.closed or os.fstat(self._fd).st_nlink:
+            return False
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        fresh = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
+        try:
+            at = 0
+            while data := os.pread(self._fd, BLOCK, at):
+                at += os.write(fresh, data)
+        except OSError:
+            os.close(fresh)
+            self.path.unlink()
+            raise
+        os.close(self._fd)
+        self._fd = fresh
+        return True
 
     def close(self) -> None:
         """Close the file."""

@@ -14,10 +14,10 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from rclpy.utilities import remove_ros_args
 
+from damadics_fd.bag.bag_writer import BagWriter
 from damadics_fd.bag.blackbox import BlackBox
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.spool import Spool
-from damadics_fd.bag.writer import BagWriter
 from damadics_fd.nodes.recorder import Recorder
 from damadics_fd.ros.spin import spin_until
 
@@ -93,11 +93,17 @@ def main(args: list[str] | None = None) -> int:
         for count, what in (
             (sum(node.lost.values()), 'lost on the way'),
             (spool.dropped, 'dropped'),
+            (bag.missed if isinstance(bag, BlackBox) else 0, 'faults without a bag'),
         )
         if count
     )
-    print(f'recorded {sum(bag.counts.values())} messages{lost}, {bag.size} bytes: {bag.path}')
-    return int(bool(spool.dropped))
+    print(f'recorded {spool.written} messages{lost}, {bag.size} bytes: {bag.path}')
+    if spool.error:
+        print(f'recorder: cannot write: {spool.error}', file=sys.stderr)
+    silent = [name for name in node.wanted if not bag.counts.get(name)]
+    if silent:
+        print(f'recorder: no message came on {" ".join(sorted(silent))}', file=sys.stderr)
+    return int(bool(spool.dropped or spool.error))
 
 
 def _bag(options: argparse.Namespace) -> BagWriter | BlackBox:

@@ -101,6 +101,11 @@ class Recorder(Node):
         """Names of the topics that are recorded."""
         return sorted(self._recorded)
 
+    @property
+    def wanted(self) -> set[str]:
+        """Names of the topics that were asked for, none where it is all."""
+        return self._wanted
+
     def look(self) -> None:
         """Subscribe to topics that have appeared, as their publishers offer them; count losses."""
         for name, kinds in self.get_topic_names_and_types():

@@ -62,7 +62,7 @@ class McapFile(MessageFile):
         self.end = 0  # [B] where the walk has seen the end of the data section
         self.crc = 0  # of the data section, 0 where the file has none
         self._chunk_places: set[int] = set()
-        self._unpacked = 0  # [B] of chunks so far
+        self._unpacked = 0  # [B] of dense chunks so far
         self._stream: BinaryIO = open_plain(self.path, limits)
         self._size = os.fstat(self._stream.fileno()).st_size
         self.summary = read_summary(self.read_bytes, self._size, limits)
@@ -197,11 +197,14 @@ class McapFile(MessageFile):
             raise BagError('the CHUNK record is damaged')
         start, end, size, _ = CHUNK.unpack_from(content)
         limits = self.limits
-        if self._unpacked + size > limits.total + limits.total_ratio * self._size:
-            raise BagError('all chunks together are beyond the limit: the rest is left')
+        dense = size > limits.dense * length
+        if dense and self._unpacked + size > limits.total:
+            raise BagError(
+                f'the chunks unpack to more than {limits.total} bytes: this one is left'
+            )
         self._chunk_places.add(at)  # what is wrong with it is told
         chunk = self._loader.load(at + HEAD.size, length)
-        self._unpacked += size
+        self._unpacked += size if dense else 0
         indexed = None if self.summary.moved else self.summary.chunks.get(at)
         if indexed and (indexed.start, indexed.end, indexed.length) != (
             start,

@@ -8,11 +8,11 @@ from collections.abc import Iterable, Sequence
 from typing import Any, Protocol
 
 import numpy as np
-import zstandard
 from numpy.typing import NDArray
 
 from damadics_fd.bag.grouping import grouped
 from damadics_fd.bag.mcap.crc import crc32
+from damadics_fd.bag.mcap.packing import Packer
 from damadics_fd.bag.mcap.records import (
     CHUNK,
     CHUNK_INDEX,
@@ -74,7 +74,7 @@ class McapWriter:
         self._stream = stream
         self._chunk_size = chunk_size
         self._message_index = message_index
-        self._compress = zstandard.ZstdCompressor(level=level).compress
+        self._pack = Packer(level)
         self._schemas: list[Schema] = []
         self._channels: list[Channel] = []
         self._counts: dict[int, int] = {}
@@ -94,6 +94,7 @@ class McapWriter:
 
     def _reset_chunk(self) -> None:
         self._parts: list[bytes] = []
+        self._waiting = 0
         self._size = 0
         self._index: dict[int, list[bytes]] = {}
         self._log_times: list[int] = []
@@ -103,6 +104,11 @@ class McapWriter:
     def pending(self) -> int:
         """Uncompressed bytes in the open chunk."""
         return self._size
+
+    @property
+    def waiting(self) -> int:
+        """Messages in the open chunk."""
+        return self._waiting
 
     @property
     def message_count(self) -> int:
@@ -151,6 +157,7 @@ class McapWriter:
         length = 22 + len(data)
         head = MESSAGE.pack(Op.MESSAGE, length, channel_id, sequence, log_time, publish_time)
         self._parts.append(head + data)
+        self._waiting += 1
         self._index.setdefault(channel_id, []).append(struct.pack('<QQ', log_time, self._size))
         self._log_times.append(log_time)
         self._size += HEAD.size + length
@@ -226,7 +233,7 @@ class McapWriter:
             else (min(start, self._times[0]), max(end, self._times[1]))
         )
         content = b''.join(self._parts)
-        packed = self._compress(content)
+        packed = self._pack(content)
         at = self.position
         chunk = record(
             Op.CHUNK,
@@ -271,8 +278,8 @@ class McapWriter:
         """Write a Metadata record that is encoded already."""
         self.end_chunk()
         place = struct.pack('<QQ', self.position, len(data))
-        self._metadata_index.append(record(Op.METADATA_INDEX, place, string(name)))
         self._write(data)
+        self._metadata_index.append(record(Op.METADATA_INDEX, place, string(name)))
 
     def put_attachment(self, about: Attachment, length: int, blocks: Iterable[bytes]) -> None:
         """
@@ -296,9 +303,10 @@ class McapWriter:
             self._write(block)
 
     def finish(self) -> None:
-        """Write the summary and the footer; the stream stays open."""
+        """Write the summary and the footer, all or nothing; the stream stays open."""
         self.end_chunk()
-        self._write(record(Op.DATA_END, struct.pack('<I', self._crc)))
+        data_end = record(Op.DATA_END, struct.pack('<I', self._crc))
+        begin = self.position + len(data_end)
         start, end = self._times or (0, 0)
         counts = b''.join(struct.pack('<HQ', *entry) for entry in self._counts.items())
         statistics = STATISTICS.pack(
@@ -324,11 +332,11 @@ class McapWriter:
         for op, members in groups.items():
             if members:
                 group = b''.join(members)
-                where = struct.pack('<BQQ', op, self.position + len(summary), len(group))
+                where = struct.pack('<BQQ', op, begin + len(summary), len(group))
                 offsets += record(Op.SUMMARY_OFFSET, where)
                 summary += group
-        places = self.position, self.position + len(summary)
+        places = begin, begin + len(summary)
         footer = HEAD.pack(Op.FOOTER, FOOTER.size) + struct.pack('<QQ', *places)
         data = summary + offsets + footer
-        self._write(data + struct.pack('<I', crc32(data)) + MAGIC)
+        self._write(data_end + data + struct.pack('<I', crc32(data)) + MAGIC)
         self._stream.flush()

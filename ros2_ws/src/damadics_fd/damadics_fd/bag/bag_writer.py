@@ -6,7 +6,6 @@ import time
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 from damadics_fd.bag.cdr.definition import schema_text, type_hash
 from damadics_fd.bag.cdr.layout import stamped_encoder
 from damadics_fd.bag.errors import BagError
+from damadics_fd.bag.latched import Kept, Latched
 from damadics_fd.bag.mcap.writer import CHUNK_SIZE, LEVEL, McapWriter
 from damadics_fd.bag.rosbag2 import (
     METADATA_FILE,
@@ -21,7 +21,6 @@ from damadics_fd.bag.rosbag2 import (
     BagMetadata,
     QosProfile,
     Topic,
-    qos,
     qos_text,
 )
 from damadics_fd.bag.whole_writes import WholeWrites
@@ -45,7 +44,6 @@ class BagWriter:
     :param chunk_size: uncompressed size of a chunk [B].
     :param flush_period: greatest age of a message that is not yet in the file [s].
     :param level: zstd compression level.
-    :param message_index: write the index behind each chunk.
     :param custom_data: entries for the `custom_data` of the bag.
     :raises BagError: where the directory already holds something or cannot be created.
     """
@@ -60,7 +58,6 @@ class BagWriter:
         chunk_size: int = CHUNK_SIZE,
         flush_period: float = FLUSH_PERIOD,
         level: int = LEVEL,
-        message_index: bool = True,
         custom_data: Mapping[str, str] | None = None,
     ):
         self.path = Path(path)
@@ -71,9 +68,7 @@ class BagWriter:
         self._split_bytes = split_bytes or quota_bytes // 8
         self._split_time = int(split_seconds * NANO)
         self._flush_period = flush_period
-        self._make_mcap = partial(
-            McapWriter, chunk_size=chunk_size, level=level, message_index=message_index
-        )
+        self._make_mcap = partial(McapWriter, chunk_size=chunk_size, level=level)
         self._custom_data = dict(custom_data or {})
         self._topics: dict[str, Topic] = {}
         self._channels: dict[str, int] = {}  # of the present file
@@ -81,6 +76,9 @@ class BagWriter:
         self._files: list[BagFile] = []
         self._sizes: dict[str, int] = {}  # of the finished files
         self._number = 0
+        self._splits = bool(self._split_bytes or self._split_time)
+        self._latched = Latched()
+        self._held: list[Kept] = []  # while the next file cannot be opened
         self._create()
         self._open()
 
@@ -94,20 +92,30 @@ class BagWriter:
             raise BagError(f'cannot create the bag: {error.strerror}', self.path) from error
 
     def _open(self) -> None:
+        """Open the next file; what waits is written to it, latched messages first."""
         name = self.path.name if self._single else f'{self.path.name}_{self._number}.mcap'
+        path = self._folder / name
         try:
-            self._stream = WholeWrites(self._folder / name)
+            self._folder.mkdir(parents=True, exist_ok=True)
+            stream = WholeWrites(path)
         except OSError as error:
             remedy = '; give another name' if isinstance(error, FileExistsError) else ''
-            raise BagError(
-                f'cannot write: {error.strerror}{remedy}', self._folder / name
-            ) from error
+            raise BagError(f'cannot write: {error.strerror}{remedy}', path) from error
+        try:
+            self._mcap = self._make_mcap(stream)
+        except OSError as error:
+            stream.close()
+            path.unlink()
+            raise BagError(f'cannot write: {error.strerror}', path) from error
+        self._stream, self._described = stream, False
         self._number += 1
         self._channels.clear()
         self._schemas.clear()
-        self._mcap = self._make_mcap(self._stream)
         self._file = BagFile(name)
         self._files.append(self._file)
+        held, self._held = self._held, []
+        for message in held:
+            self._add(*message)
 
     def add_topic(
         self,
@@ -157,8 +165,26 @@ class BagWriter:
         :param log_time: when it was received [ns].
         :param publish_time: when it was published [ns].
         """
-        if self._split_bytes or self._split_time:
-            self._split_if_due(log_time)
+        if self._splits or self._held:
+            try:
+                self._split_if_due(log_time)
+            except (OSError, BagError):
+                if self._stream.closed:
+                    self._held.append(Kept(topic, data, log_time, publish_time))
+                else:
+                    self._add(topic, data, log_time, publish_time)
+                raise
+        self._add(topic, data, log_time, publish_time)
+
+    def _add(self, topic: Topic, data: bytes, log_time: int, publish_time: int) -> None:
+        if self._splits and not self._file.counts:  # a late reader of this file wants them, too
+            for kept in self._latched.before(log_time):
+                self._put(kept.topic, kept.data, log_time, kept.publish_time)
+        self._put(topic, data, log_time, publish_time)
+        if self._splits:
+            self._latched.keep(Kept(topic, data, log_time, publish_time))
+
+    def _put(self, topic: Topic, data: bytes, log_time: int, publish_time: int) -> None:
         channel = self._channel(topic)
         self._file.note(topic.name, log_time, log_time, 1)
         self._mcap.add_message(channel, data, log_time, publish_time)
@@ -189,6 +215,9 @@ class BagWriter:
         self._mcap.add_rows(channels, stamp, payloads)
 
     def _split_if_due(self, log_time: int) -> None:
+        if self._stream.closed:  # the next file could not be opened before
+            self._open()
+            return
         file = self._file
         too_big = self._split_bytes and self._mcap.position >= self._split_bytes
         too_long = self._split_time and log_time - file.start >= self._split_time
@@ -209,6 +238,9 @@ class BagWriter:
 
     def flush(self) -> None:
         """Hand all messages to the operating system."""
+        if self._stream.closed and self._held:
+            self._open()
+        self._stream.restore()
         self._mcap.flush()
 
     def flush_if_due(self) -> None:
@@ -216,12 +248,21 @@ class BagWriter:
         if self._mcap.pending and (
             time.monotonic() - self._mcap.chunk_opened >= self._flush_period
         ):
-            self._mcap.flush()
+            self.flush()
 
     @property
     def size(self) -> int:
         """Bytes in all files of the bag."""
         return sum(self._sizes.values()) + self._mcap.position
+
+    @property
+    def unsaved(self) -> int:
+        """Messages that are in memory only."""
+        return self._mcap.waiting + len(self._held)
+
+    def abandon(self) -> None:
+        """Let go of a file that cannot be finished; its whole chunks stay readable."""
+        self._stream.close()
 
     @property
     def counts(self) -> dict[str, int]:
@@ -240,17 +281,23 @@ class BagWriter:
     def _finish_file(self) -> None:
         for topic in self._present():
             self._channel(topic)  # a topic without messages is part of the bag, too
-        entries = {'serialized_metadata': self._metadata().to_yaml(root=False)}
-        self._mcap.add_metadata('rosbag2', entries)
+        self._stream.restore()
+        if not self._described:
+            entries = {'serialized_metadata': self._metadata().to_yaml(root=False)}
+            self._mcap.add_metadata('rosbag2', entries)
+            self._described = True
         self._mcap.finish()
         self._stream.close()
         self._sizes[self._file.path] = self._mcap.position
         if not self._single:
-            text = self._metadata().to_yaml()
-            (self._folder / METADATA_FILE).write_text(text, encoding='utf-8')
+            fresh = self._folder / f'.{METADATA_FILE}'
+            fresh.write_text(self._metadata().to_yaml(), encoding='utf-8')
+            fresh.replace(self._folder / METADATA_FILE)
 
     def close(self) -> None:
         """Finish the last file and write `metadata.yaml`."""
+        if self._held:
+            self._open()
         if not self._stream.closed:
             self._finish_file()
             self._mcap.position = 0  # counted with the finished files
@@ -259,34 +306,6 @@ class BagWriter:
         """Return the writer."""
         return self
 
-    def __exit__(self, *exception: Any) -> None:
+    def __exit__(self, *exception: object) -> None:
         """Close the bag."""
         self.close()
-
-
-def write_columns(
-    path: str | Path,
-    columns: Mapping[str, NDArray],
-    frame_id: str = 'LC74_20',
-) -> None:
-    """
-    Write simulated or converted columns as the recorder would have written them.
-
-    :param path: `.mcap` file or bag directory.
-    :param columns: `stamp` [ns] and fields of `damadics_msgs/Measurement`, NaN if absent; with
-        `fault` and `strength` also the topic `/fault_state`.
-    :param frame_id: tag of the actuator.
-    :raises BagError: where the file cannot be written or the messages are not built.
-    """
-    stamp = np.asarray(columns['stamp'], np.int64)
-    names = ('cv', 'x1', 'p1', 'p2', 't1', 'flow', 'ps')
-    missing = np.full(len(stamp), np.nan)
-    messages = {'/measurement': {name: columns.get(name, missing) for name in names}}
-    kinds = {'/measurement': 'damadics_msgs/msg/Measurement'}
-    if 'fault' in columns:
-        messages['/fault_state'] = {name: columns[name] for name in ('strength', 'fault')}
-        kinds['/fault_state'] = 'damadics_msgs/msg/FaultState'
-    with BagWriter(path) as bag:
-        for name, kind in kinds.items():
-            bag.add_topic(name, kind, [qos(depth=1000)])
-        bag.write_columns(stamp, messages, frame_id)
