@@ -57,7 +57,8 @@ class Server:
             self._process = subprocess.Popen(
                 self._command, stdin=subprocess.PIPE, stdout=log, stderr=subprocess.STDOUT
             )
-        if not wait_for(lambda: listens(self.port) or self._process.poll() is not None):
+        ready = lambda: listens(self.port) or self._process.poll() is not None  # noqa: E731
+        if not wait_for(ready, 60.0):
             pytest.fail(f'{self._command} does not listen')
         assert self._process.poll() is None, self._log.read_text(errors='replace')[-2000:]
 

@@ -10,6 +10,8 @@ import threading
 from collections.abc import Awaitable, Callable, Sequence
 
 import rclpy
+from damadics_fd.ros.diagnostics import Diagnostics, Report
+from damadics_fd.ros.entities import Entities
 from damadics_fd.ros.spin import spin_until
 from rclpy.executors import ExternalShutdownException
 from rclpy.experimental import EventsExecutor
@@ -39,6 +41,15 @@ class Graph:
         self.node = Node(name)
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._spin, name='ros', daemon=True)
+
+    def tell_health(self, what: str, report: Callable[[], Report]) -> None:
+        """
+        Have a report published on `/diagnostics` once a second.
+
+        :param what: is reported on.
+        :param report: returns level, sentence and key-values.
+        """
+        Diagnostics(self.node, Entities(self.node), what, report)
 
     def start(self) -> None:
         """Begin to spin; make publishers, subscriptions and timers before."""

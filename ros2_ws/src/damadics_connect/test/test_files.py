@@ -5,7 +5,7 @@ from zoneinfo import ZoneInfo
 
 import pyarrow as pa
 import pytest
-from damadics_connect.files.follow import FollowError, Folder, GrowingCsv
+from damadics_connect.files.follow import Folder, FollowError, GrowingCsv
 from damadics_connect.files.source import Files, Stamps
 from damadics_connect.publishing import look_for_zeros
 from damadics_connect.valve_list import Signal, ValveSource

@@ -43,8 +43,6 @@ async def follow(path: Path, ros_args: list[str]) -> int:
     :param ros_args: arguments of ROS 2.
     :return: exit code.
     """
-    from damadics_fd.ros.diagnostics import Diagnostics
-
     from damadics_connect.files.source import UNITS, Files, Stamps
     from damadics_connect.publishing import output_of
     from damadics_connect.valve_list import read_valves
@@ -75,7 +73,7 @@ async def follow(path: Path, ros_args: list[str]) -> int:
             output,
             graph.node.get_logger().info,
         )
-        Diagnostics(graph.node, 'files', files.report)
+        graph.tell_health('files', files.report)
         graph.start()
         await files.run()
     finally:

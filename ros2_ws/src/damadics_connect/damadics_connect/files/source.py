@@ -14,7 +14,7 @@ from zoneinfo import ZoneInfo
 from damadics_fd.core.sample import SIGNALS
 from damadics_fd.ros.diagnostics import Report
 
-from damadics_connect.files.follow import FollowError, Folder, GrowingCsv, Row
+from damadics_connect.files.follow import Folder, FollowError, GrowingCsv, Row
 from damadics_connect.health import report
 from damadics_connect.joining import NANO, Joiner
 from damadics_connect.publishing import Output

@@ -58,8 +58,6 @@ async def connect(path: Path, ros_args: list[str]) -> int:
         from damadics_connect.mqtt.outgoing import Outgoing
     except ModuleNotFoundError as problem:
         raise ConnectError(MISSING) from problem
-    from damadics_fd.ros.diagnostics import Diagnostics
-
     from damadics_connect.publishing import output_of
     from damadics_connect.valve_list import read_valves
     from damadics_connect.watch import Watch
@@ -84,7 +82,7 @@ async def connect(path: Path, ros_args: list[str]) -> int:
         if valves:
             output = output_of(publish, graph.node, [valve.known_as for valve in valves])
             incoming = Incoming(broker, valves, field, output, log)
-            Diagnostics(graph.node, 'MQTT', incoming.report)
+            graph.tell_health('MQTT', incoming.report)
             jobs.append(incoming.run())
         if out:
             watch = Watch(graph.node)

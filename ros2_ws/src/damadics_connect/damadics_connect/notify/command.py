@@ -56,7 +56,7 @@ async def notify(path: Path, test: bool, ros_args: list[str]) -> int:
         from damadics_connect.notify.delivery import Delivery, read_targets, send
     except ModuleNotFoundError as problem:
         raise ConnectError(MISSING) from problem
-    from damadics_fd.ros.diagnostics import Diagnostics, Level, Report
+    from damadics_fd.ros.diagnostics import Level, Report
 
     from damadics_connect.judgement import Judgement, Transition
     from damadics_connect.notify.rules import (
@@ -121,7 +121,7 @@ async def notify(path: Path, test: bool, ros_args: list[str]) -> int:
         lambda judgement: _later(loop, lambda: on_state(judgement)),
         lambda event: _later(loop, lambda: on_event(event)),
     )
-    Diagnostics(graph.node, 'notifications', report)
+    graph.tell_health('notifications', report)
     graph.start()
 
     async def tick() -> None:

@@ -49,8 +49,6 @@ async def connect(path: Path, ros_args: list[str]) -> int:
     :param ros_args: arguments of ROS 2.
     :return: exit code.
     """
-    from damadics_fd.ros.diagnostics import Diagnostics
-
     from damadics_connect.opcua.cycles import Cycles
     from damadics_connect.opcua.server import Judgements, read_serve
     from damadics_connect.opcua.session import read_endpoint
@@ -84,7 +82,7 @@ async def connect(path: Path, ros_args: list[str]) -> int:
             if serve is not None:
                 output = cycles = Cycles(output, names, state_folder() / 'cycles.json')
             source = Source(endpoint, valves, options, output, log)
-            Diagnostics(graph.node, 'OPC UA', source.report)
+            graph.tell_health('OPC UA', source.report)
             jobs.append(source.run())
         if serve is not None:
             counts = cycles.counts if cycles else {}

@@ -27,6 +27,7 @@ from damadics_connect.settings import shown
 from damadics_connect.valve_list import ValveSource
 
 SHORTEST_INTERVAL, LONGEST_INTERVAL = 0.02, 0.5  # s between two messages of the server
+HELD_UP = 2.0  # s for which the server keeps values while it, the network or we are held up
 KEEP_ALIVE = 0.5  # s between two words of a server that has nothing new
 QUIET = 1.2  # s without a word after which the session counts as lost
 PAUSES = (0.2, 0.5, 1.0, 2.0, 5.0)  # s before it is tried again
@@ -42,7 +43,7 @@ class Options(NamedTuple):
     """How the server is asked."""
 
     interval: float = 0.0  # s between two messages of the server; 0: half the valve's period
-    queue: int = 0  # values kept for one message; 0: as many as fit into it, twice
+    queue: int = 0  # values kept for one message; 0: those of 2 s more
     poll: bool = False  # read instead of subscribing
 
 
@@ -71,7 +72,7 @@ class Feed:
         self.period = period
         half = min(max(period / 2.0, SHORTEST_INTERVAL), LONGEST_INTERVAL)
         self.interval = options.interval or half
-        self.queue = options.queue or max(2, 2 * round(self.interval / period) + 2)
+        self.queue = options.queue or round((self.interval + HELD_UP) / period) + 2
         self.items: list[Item] = []
         self.nodes: list[str] = []
         self.joiners: dict[str, Joiner] = {}
