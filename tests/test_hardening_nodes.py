@@ -1,0 +1,332 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Running nodes under attack: lost files, old samples, wild stamps, hostile text, bad requests."""
+
+import os
+import signal
+import time
+from pathlib import Path
+
+import pytest
+from damadics_bringup.launcher import arguments_of
+from damadics_bringup.processes import parameters
+from damadics_fd.ros import qos
+from damadics_msgs.msg import Estimate, FaultFlag, OperatorAction
+from damadics_msgs.srv import Acknowledge, Reference, ResetAlarm, Shelve
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState, GetState
+from std_srvs.srv import Empty as Empty
+from test_operations_nodes import SETTINGS, start
+
+pytestmark = pytest.mark.ros
+HEALTHY, UNKNOWN = FaultFlag.STATE_HEALTHY, FaultFlag.STATE_UNKNOWN
+NAMES = ('estimator', 'detector')
+
+
+def await_state(valve, state, patience=30.0):
+    assert valve.run_until(
+        lambda: valve.flags and valve.flags[-1].state == state, patience=patience
+    )
+
+
+def test_a_damaged_alarm_is_shown_as_lost_until_somebody_confirms(processes, peer, tmp_path):
+    alarms = tmp_path / 'alarms'
+    valve = start(processes, peer, str(alarms))
+    valve.raise_alarm()
+    files = sorted(alarms.glob('root.alarm.*.json'))
+    assert len(files) == 2
+    processes.kill('detector')
+    for file in files:
+        file.write_bytes(file.read_bytes()[:-20])
+    before = len(valve.flags)
+    again = parameters(alarm_folder=str(alarms), **SETTINGS)
+    processes.start('damadics_fd', 'detector', again)
+    await_state(valve, UNKNOWN)
+    valve.run(2.0)
+    assert HEALTHY not in {flag.state for flag in valve.flags[before:]}
+    assert valve.flags[-1].level == FaultFlag.NE107_FUNCTION_CHECK
+    assert valve.run_until(lambda: valve.says('detector', 'the alarm of before is lost'))
+    assert valve.report('detector').level == b'\x02'
+    assert len(list(alarms.glob('*.bad-*'))) == 2
+    processes.kill('detector')  # a restart is no confirmation
+    before = len(valve.flags)
+    processes.start('damadics_fd', 'detector', again)
+    await_state(valve, UNKNOWN)
+    assert HEALTHY not in {flag.state for flag in valve.flags[before:]}
+    assert valve.call(Acknowledge, 'acknowledge', user='Anna', comment='looked at it').success
+    await_state(valve, HEALTHY)
+
+
+def test_an_alarm_that_cannot_be_saved_is_told_and_saved_later(processes, peer, tmp_path):
+    alarms = tmp_path / 'alarms'
+    valve = start(processes, peer, str(alarms))
+    valve.run(0.5)
+    (alarms / 'root.alarm.a.json').mkdir()  # no file can take its place
+    valve.raise_alarm()
+    assert valve.run_until(lambda: valve.says('detector', 'would not survive a restart'))
+    assert valve.report('detector').level == b'\x02'
+    (alarms / 'root.alarm.a.json').rmdir()
+    assert valve.run_until(lambda: not valve.says('detector', 'would not survive'))
+    assert (alarms / 'root.alarm.a.json').is_file()
+
+
+def test_folders_that_cannot_be_written_are_refused_at_the_start(processes, domain):
+    for n, given in enumerate(
+        ({'alarm_folder': '/dev/null/x'}, {'signature_folder': '/proc/x', 'alarm_folder': ''})
+    ):
+        processes.start('damadics_fd', 'detector', parameters(**SETTINGS, **given), f'd{n}')
+    processes.start('damadics_fd', 'estimator', parameters(reference='/proc/x/y', **SETTINGS), 'e')
+    deadline = time.monotonic() + 60.0
+    labels = ('d0', 'd1', 'e')
+    while not all(map(processes.ended, labels)) and time.monotonic() < deadline:
+        time.sleep(0.1)
+    for label in labels:
+        assert processes.exit_code(label) == 1
+        assert 'cannot write into' in processes.log(label).read_text()
+
+
+def test_samples_that_waited_are_not_healthy(processes, peer):
+    """B1: an estimator that stood still goes through old samples afterwards."""
+    valve = start(processes, peer)
+    await_state(valve, HEALTHY)
+    os.kill(processes.pid('estimator'), signal.SIGSTOP)
+    valve.run(5.0)
+    before = len(valve.flags)
+    os.kill(processes.pid('estimator'), signal.SIGCONT)
+    ages = []
+    valve.peer.node.create_subscription(
+        FaultFlag,
+        'fault_flag',
+        lambda flag: ages.append(
+            (
+                flag.state,
+                valve.stamp * 1e-9 - flag.header.stamp.sec - 1e-9 * flag.header.stamp.nanosec,
+            )
+        ),
+        qos.FLAG,
+    )
+    await_state(valve, HEALTHY)
+    valve.run(1.0)
+    assert valve.flags[before].state == FaultFlag.STATE_NOT_MONITORING
+    assert max((age for state, age in ages if state == HEALTHY), default=0.0) < 2.5
+
+
+def test_dated_samples_that_are_old_are_not_healthy_and_say_why(processes, peer):
+    valve = start(processes, peer)
+    valve.stamp = time.time_ns() - 60 * 10**9
+    valve.run(3.0)
+    assert HEALTHY not in {flag.state for flag in valve.flags}
+    assert valve.run_until(lambda: valve.says('detector', 's old'))
+    valve.stamp = time.time_ns()
+    await_state(valve, HEALTHY)
+
+
+def test_one_stamp_of_2038_ends_no_shelf(processes, peer):
+    valve = start(processes, peer)
+    await_state(valve, HEALTHY)
+    assert valve.call(Shelve, 'shelve', duration=600.0).success
+    wild = peer.node.create_publisher(Estimate, 'estimate', qos.SAMPLES)
+    assert peer.wait(lambda: wild.get_subscription_count() > 0)
+    message = Estimate()
+    message.header.stamp.sec = 2**31 - 5
+    for _ in range(3):
+        wild.publish(message)
+        peer.send((2**31 - 5) * 10**9, 0.5, 0.5)
+        valve.run(0.3)
+    assert valve.flags[-1].state == FaultFlag.STATE_SHELVED
+    values = {v.key: v.value for v in valve.report('detector').values}
+    assert int(values['Messages stamped far ahead']) >= 2
+    peer.node.destroy_publisher(wild)
+
+
+def test_a_transition_that_does_not_fit_is_answered(processes, peer):
+    valve = start(processes, peer)
+    for node in NAMES:
+        for given in ({'id': Transition.TRANSITION_ACTIVATE}, {'id': 200}, {'label': 'nonsense'}):
+            answer = valve.call(
+                ChangeState, f'{node}/change_state', transition=Transition(**given)
+            )
+            assert not answer.success
+        assert valve.call(GetState, f'{node}/get_state').current_state.label == 'active'
+    await_state(valve, HEALTHY)
+    assert not any(map(processes.ended, NAMES))
+
+
+def test_what_is_made_is_released_and_made_again(processes, peer):
+    valve = start(processes, peer)
+    graph = peer.node
+    steps = [
+        (Transition.TRANSITION_DEACTIVATE, 1),
+        (Transition.TRANSITION_CLEANUP, 0),
+        (Transition.TRANSITION_CONFIGURE, 1),
+        (Transition.TRANSITION_ACTIVATE, 1),
+    ]
+    for _ in range(3):
+        await_state(valve, HEALTHY)
+        for step, expected in steps:
+            for node in NAMES:
+                done = valve.call(
+                    ChangeState, f'{node}/change_state', transition=Transition(id=step)
+                )
+                assert done.success, (node, step)
+            assert valve.run_until(
+                lambda n=expected: (
+                    graph.count_publishers('/estimate') == n
+                    and graph.count_publishers('/fault_flag') == n
+                    and graph.count_subscribers('/measurement') == n
+                )
+            )
+            services = {name for name, _ in graph.get_service_names_and_types()}
+            assert ('/acknowledge' in services) == ('/relearn' in services) == bool(expected)
+    assert not any(map(processes.ended, NAMES))
+
+
+HOSTILE = 'TAG" innerHTML="<img src=x>\x1b[31m\n' + 'x' * 100_000
+
+
+def test_hostile_text_comes_out_short_and_without_controls(processes, peer):
+    valve = start(processes, peer)
+    actions = peer.listen(OperatorAction, 'operator_action', qos.EVENTS)
+    valve.raise_alarm()
+    assert valve.call(Acknowledge, 'acknowledge', user=HOSTILE, comment=HOSTILE).success
+    assert valve.run_until(lambda: actions and 'TAG' in valve.events[-1].text)
+    assert len(valve.events[-1].text) <= 1000
+    texts = [valve.events[-1].text, actions[-1].user, actions[-1].comment, actions[-1].result]
+    assert all(text.isprintable() for text in texts)
+    assert len(actions[-1].user) <= 100
+    assert len(actions[-1].comment) <= 200
+    assert (actions[-1].action, actions[-1].success) == (OperatorAction.ACKNOWLEDGE, True)
+    assert actions[-1].occurrence == valve.flags[-1].occurrence
+    assert not valve.call(Acknowledge, 'acknowledge', occurrence=999, user='Bert').success
+    assert valve.run_until(lambda: actions[-1].user == 'Bert')
+    assert not actions[-1].success
+    log = processes.log('detector').read_text()
+    assert '\x1b' not in log
+    assert max(map(len, log.splitlines())) < 2000
+    assert valve.call(ResetAlarm, 'reset', user='Anna').success
+
+
+@pytest.mark.parametrize(
+    ('path', 'says'),
+    [
+        ('../../x', 'is not below'),
+        ('/etc/x', 'is not below'),
+        ('a\0b', 'no path'),
+        ('x' * 5000, 'no path'),
+        ('.', 'is not below'),
+        ('sub/../../x', 'is not below'),
+    ],
+    ids=['up', 'absolute', 'nul', 'long', 'folder', 'detour'],
+)
+def test_a_reference_stays_below_its_folder(path, says, tmp_path):
+    from damadics_fd.store.references import reference_path
+
+    with pytest.raises(ValueError, match=says):
+        reference_path(path, tmp_path / 'lv101')
+
+
+def test_a_reference_is_asked_for_by_its_name(tmp_path, monkeypatch):
+    from damadics_fd.store.references import reference_path
+
+    assert reference_path('', tmp_path / 'lv101') == tmp_path / 'lv101'
+    assert reference_path('other', tmp_path / 'lv101') == tmp_path / 'other'
+    assert reference_path(str(tmp_path / 'b'), tmp_path / 'lv101') == tmp_path / 'b'
+    (tmp_path / 'link').symlink_to('/etc')
+    with pytest.raises(ValueError, match='is not below'):
+        reference_path('link/x', tmp_path / 'lv101')
+    monkeypatch.setenv('XDG_STATE_HOME', str(tmp_path))
+    assert reference_path('a', None) == tmp_path / 'damadics_fd' / 'references' / 'a'
+    with pytest.raises(ValueError, match='no file'):
+        reference_path('', None)
+
+
+def test_services_of_references_answer_with_absolute_paths(processes, peer, tmp_path):
+    valve = start(processes, peer)
+    for name in ('save_reference', 'load_reference'):
+        answer = valve.call(Reference, name, path='/proc/self/mem')
+        assert not answer.success
+        assert 'is not below /' in answer.message
+    assert not any(map(processes.ended, NAMES))
+
+
+def test_a_tag_with_a_slash_is_a_tag_like_others(processes, peer, tmp_path):
+    valve = start(processes, peer, str(tmp_path / 'alarms'), actuator='LV/101')
+    await_state(valve, HEALTHY)
+    assert valve.report('detector').hardware_id == 'LV/101'
+    assert not any(map(processes.ended, NAMES))
+
+
+def test_a_node_that_gives_way_takes_no_other_with_it(processes, peer):
+    """Two processes with a common valve: the other valve of the second one goes on."""
+
+    def words(*valves):
+        found = []
+        for valve in valves:
+            for node in NAMES:
+                found += ['--', node, *arguments_of(SETTINGS, namespace=valve)]
+        return found[1:]
+
+    flags = {v: peer.listen(FaultFlag, f'/{v}/fault_flag', qos.FLAG) for v in ('a1', 'b1')}
+    processes.start('damadics_fd', 'monitors', words('a1'), 'first')
+    assert peer.wait(lambda: flags['a1'], 60.0)
+    peer.wait(lambda: False, 5.0)
+    processes.start('damadics_fd', 'monitors', words('a1', 'b1'), 'second')
+    assert peer.wait(lambda: flags['b1'], 60.0)
+    log = processes.log('second')
+    assert peer.wait(lambda: 'another detector sends' in log.read_text(), 20.0)
+    before = len(flags['b1'])
+    assert peer.wait(lambda: len(flags['b1']) > before + 3, 15.0), 'the healthy valve has ended'
+    assert not processes.ended('second')
+    assert 'Traceback' not in log.read_text()
+    assert log.read_text().count('FATAL') == 1
+
+
+@pytest.mark.parametrize(
+    ('content', 'says'),
+    [
+        ('a sentence', 'no section'),
+        ('', 'no section'),
+        ('/lv999/estimator: {ros__parameters: {mode: paper}}', '/lv999/estimator'),
+        ('[1, 2', 'no parameter file'),
+    ],
+    ids=['text', 'empty', 'other', 'broken'],
+)
+def test_a_parameter_file_that_sets_nothing_is_told(tmp_path, content, says):
+    from damadics_fd.ros.parameter_files import says_nothing
+
+    file = tmp_path / 'p.yaml'
+    file.write_text(content)
+    told = says_nothing(file, '/zz1/estimator')
+    assert told.startswith(f'{file} sets nothing for /zz1/estimator')
+    assert says in told
+
+
+@pytest.mark.parametrize(
+    'content',
+    [
+        '/**: {ros__parameters: {mode: paper}}',
+        '/**/estimator: {ros__parameters: {mode: paper}}',
+        '/zz1/estimator: {ros__parameters: {mode: paper}}',
+        '/*/estimator: {ros__parameters: {mode: paper}}',
+        'zz1: {estimator: {ros__parameters: {mode: paper}}}',
+        '/zz1/**: {ros__parameters: {mode: paper}}',
+    ],
+)
+def test_a_parameter_file_that_sets_something_is_not_told(tmp_path, content):
+    from damadics_fd.ros.parameter_files import says_nothing
+
+    file = tmp_path / 'p.yaml'
+    file.write_text(content)
+    assert says_nothing(file, '/zz1/estimator') == ''
+
+
+def test_a_position_frozen_while_the_control_value_moves_is_told_live(processes, peer):
+    valve = start(processes, peer)
+    await_state(valve, HEALTHY)
+    end = valve.stamp + 6 * 10**9
+    while valve.stamp < end:
+        peer.send(valve.stamp, 0.3 + 0.4 * (valve.stamp // 10**9 % 2), 0.5)
+        valve.stamp += 10_000_000
+        peer.wait(lambda: False, 0.01)
+    assert peer.wait(lambda: valve.says('estimator', 'position has not moved'), 3.0)
+    assert Path(processes.log('estimator')).exists()
