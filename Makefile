@@ -10,7 +10,7 @@ READERS := tools/npm/node_modules/.package-lock.json
 SOURCES := $(shell find ros2_ws/src -type f -not -name '*.pyc' -not -path '*/__pycache__/*' \
 	-not -path '*/test/*' -not -path '*/.pytest_cache/*')
 
-.PHONY: help demo dashboard test report campaign-monitor build env lint types docs clean
+.PHONY: help demo dashboard test report campaign-monitor build env lint types docs lock licences clean
 
 help: ## show what can be made
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 18
@@ -54,8 +54,15 @@ types: $(BUILT)
 	@$(ENV) && mypy ros2_ws/src/damadics_fd/damadics_fd/core
 
 docs: $(BUILT) ## the documentation with the API pages: docs/_build/index.html
-	@$(ENV) && python -m uv pip install --quiet -r tools/requirements/docs.txt \
+	@$(ENV) && python -m uv pip install --quiet --require-hashes -r tools/requirements/docs.txt \
+		-c tools/requirements/constraints.txt \
 		&& sphinx-build -q -W --keep-going docs docs/_build && echo docs/_build/index.html
+
+lock: $(BUILT) ## pin every package with its hashes, after a change of tools/requirements
+	@$(ENV) && python tools/lock.py
+
+licences: $(BUILT) ## the licence of every installed package
+	@$(ENV) && python tools/licences.py
 
 clean: ## remove everything that was built
 	rm -rf .venv docs/_build tools/npm/node_modules ros2_ws/build ros2_ws/install ros2_ws/log

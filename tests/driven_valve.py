@@ -29,7 +29,7 @@ class Valve:
         self.events = peer.listen(FaultEvent, 'fault_event', qos.EVENTS)
         self.reports = peer.listen(DiagnosticArray, '/diagnostics', QoSProfile(depth=100))
 
-    def run(self, seconds: float, throw: bool = False) -> None:
+    def run(self, seconds: float, throw: bool = False, swing: bool = False) -> None:
         """Send samples for a while; their stamps keep up with the clock, as those of a plant."""
         end = time.monotonic() + seconds
         if self.stamp != self.next:  # set by the test
@@ -40,7 +40,8 @@ class Valve:
                 self.stamp = int(due / PERIOD * 1e9) * PERIOD  # it was paused
             while self.stamp * 1e-9 <= due:
                 x1 = 0.5 + (0.1 * (self.stamp // (20 * PERIOD) % 2) if throw else 0.0)
-                self.peer.send(self.stamp, 0.5, x1)
+                cv = 0.3 + 0.4 * (self.stamp // 10**9 % 2) if swing else 0.5
+                self.peer.send(self.stamp, cv, x1)
                 self.stamp += PERIOD
             self.next = self.stamp
             self.peer.wait(lambda: False, PERIOD * 1e-9)

@@ -204,3 +204,28 @@ def test_setup_repairs_exported_paths_in_this_environment_only(tmp_path, monkeyp
     assert first == '${_IMPORT_PREFIX}/include/std_msgs'
     assert Path(python, 'Python.h').is_file()
     assert Path(numpy, 'numpy', 'arrayobject.h').is_file()
+
+
+def test_every_requirement_is_pinned_with_hashes_and_no_address():
+    folder = ROOT / 'tools' / 'requirements'
+    locked = (folder / 'constraints.txt').read_text()
+    assert '://' not in locked
+    pins = {
+        line.split()[0].partition('==')[0]: line.split()[0]
+        for line in locked.splitlines()
+        if line and line[0] not in '# '
+    }
+    for file in folder.glob('*.txt'):
+        if file.name == 'constraints.txt':
+            continue
+        for line in file.read_text().splitlines():
+            name, pinned, version = line.partition('==')
+            if pinned and not line.startswith('#'):
+                plain = name.partition('[')[0].lower()
+                assert pins[plain] == f'{plain}=={version}', f'{file.name}: run make lock'
+    blocks = locked.split('\n    --hash=sha256:')
+    assert len(blocks) > len(pins) > 100
+    assert all(
+        f'{pin} ' in locked and f'{pin} \\\n    --hash' in locked or ';' in locked
+        for pin in pins.values()
+    )

@@ -26,6 +26,7 @@ REQUIREMENTS = ROOT / 'tools' / 'requirements'
 JAZZY = Path('/opt/ros/jazzy')
 UV = 'uv==0.13.9'
 PYTHONS = ((3, 11), (3, 13))
+CONSTRAINTS = REQUIREMENTS / 'constraints.txt'  # made by lock.py
 
 
 class UnsupportedError(Exception):
@@ -110,7 +111,7 @@ def fingerprint(files: list[Path]) -> str:
     :return: a digest that changes with the requirements, this program and the interpreter.
     """
     digest = hashlib.sha256(sys.version.encode())
-    for path in [*files, Path(__file__)]:
+    for path in [*files, CONSTRAINTS, Path(__file__)]:
         digest.update(path.read_bytes())
     return digest.hexdigest()
 
@@ -125,11 +126,15 @@ def install(files: list[Path], ros_installed: bool) -> None:
     venv.create(VENV, with_pip=True, clear=True, system_site_packages=ros_installed)
     python = str(VENV / 'bin' / 'python')
     requirements = [word for path in files for word in ('-r', str(path))]
-    subprocess.run([python, '-m', 'pip', 'install', '--quiet', UV], check=True)
-    subprocess.run(
-        [python, '-m', 'uv', 'pip', 'install', '--quiet', '--python', python, *requirements],
-        check=True,
-    )
+    lines = CONSTRAINTS.read_text().split('\n')
+    pinned = lines[lines.index(f'{UV} \\') :]
+    end = next(n for n, line in enumerate(pinned) if not line.endswith('\\'))
+    bootstrap = VENV / 'uv.txt'
+    bootstrap.write_text('\n'.join(pinned[: end + 1]) + '\n')
+    pip = [python, '-m', 'pip', 'install', '--quiet', '--require-hashes', '-r', str(bootstrap)]
+    subprocess.run(pip, check=True)
+    uv = [python, '-m', 'uv', 'pip', 'install', '--quiet', '--require-hashes', '--python', python]
+    subprocess.run([*uv, *requirements, '-c', str(CONSTRAINTS)], check=True)
 
 
 def repair_exported_paths() -> int:
