@@ -58,8 +58,8 @@ docs: $(BUILT) ## the documentation with the API pages: docs/_build/index.html
 		-c tools/requirements/constraints.txt \
 		&& sphinx-build -q -W --keep-going docs docs/_build && echo docs/_build/index.html
 
-lock: $(BUILT) ## pin every package with its hashes, after a change of tools/requirements
-	@$(ENV) && python tools/lock.py
+lock: ## pin every package with its hashes, after a change of tools/requirements
+	@.venv/bin/python tools/lock.py
 
 licences: $(BUILT) ## the licence of every installed package
 	@$(ENV) && python tools/licences.py
