@@ -10,8 +10,9 @@ from pathlib import Path
 from damadics_evaluate.baselines import DETECTORS, MissingPackageError
 from damadics_evaluate.baselines.classifiers import train
 from damadics_evaluate.benchmark.campaign import Campaign
+from damadics_evaluate.benchmark.compare import compare, overall
 from damadics_evaluate.benchmark.runner import admit, read_results, run_campaign
-from damadics_evaluate.benchmark.tables import compare, write_csv
+from damadics_evaluate.benchmark.tables import write_csv
 from damadics_evaluate.lublin import command as lublin
 from damadics_evaluate.recordings import command as recordings
 from damadics_evaluate.scenarios.cases import SCENARIOS
@@ -214,7 +215,7 @@ def _compare(arguments: argparse.Namespace) -> None:
         raise ValueError(f'{arguments.a} and {arguments.b} share no scenario and detector')
     print(
         f'{"scenario":10} {"detector":14} {"found a":>8} {"found b":>8} '
-        f'{"t_dt a":>8} {"t_dt b":>8} {"earlier":>8} {"later":>6} {"p":>6}'
+        f'{"t_dt a":>8} {"t_dt b":>8} {"earlier":>8} {"later":>6} {"p":>6} {"p Holm":>7}'
     )
     for row in rows:
         if row['earlier_in_b'] or row['later_in_b'] or row['detected_a'] != row['detected_b']:
@@ -222,8 +223,15 @@ def _compare(arguments: argparse.Namespace) -> None:
                 f'{row["scenario"]:10} {row["detector"]:14} {row["detected_a"]:8.0%} '
                 f'{row["detected_b"]:8.0%} {_seconds(row["t_dt_a"]):>8} '
                 f'{_seconds(row["t_dt_b"]):>8} {row["earlier_in_b"]:8} '
-                f'{row["later_in_b"]:6} {row["p"]:6.2f}'
+                f'{row["later_in_b"]:6} {row["p"]:6.2f} {row["p_holm"]:7.2f}'
             )
+    for row in overall(first, second):
+        print(
+            f'{row["detector"]}: {row["pairs"]} pairs, {row["earlier_in_b"]} earlier in b, '
+            f'{row["later_in_b"]} later, {row["only_in_a"]} found only in a, '
+            f'{row["only_in_b"]} only in b; median difference {_seconds(row["difference"])} s '
+            f'[{_seconds(row["low"])}, {_seconds(row["high"])}], p {row["p"]:.2g}'
+        )
     same = sum(not r['earlier_in_b'] and not r['later_in_b'] for r in rows)
     print(f'{same} of {len(rows)} pairs without a difference; "earlier", "later": seeds of b')
     settings = [

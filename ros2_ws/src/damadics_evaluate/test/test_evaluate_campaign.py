@@ -14,13 +14,12 @@ from damadics_evaluate.benchmark.campaign import (
     NOMINAL_SEED,
     Campaign,
 )
+from damadics_evaluate.benchmark.compare import compare, holm, overall, sign_test
 from damadics_evaluate.benchmark.runner import read_results, run_campaign
 from damadics_evaluate.benchmark.tables import (
-    compare,
     false_alarms,
     operating_curve,
     quantile,
-    sign_test,
     summary,
 )
 from damadics_evaluate.benchmark.units import debounced, limits, scenario_unit
@@ -148,6 +147,11 @@ def test_summary_and_comparison():
     versus = compare(a, b)[0]
     assert (versus['earlier_in_b'], versus['later_in_b']) == (2, 0)
     assert versus['p'] == pytest.approx(0.5)
+    assert versus['p_holm'] == versus['p']  # one row only
+    whole = overall(a, b)[0]
+    assert (whole['pairs'], whole['earlier_in_b'], whole['only_in_b']) == (3, 2, 1)
+    assert whole['difference'] == -5
+    assert holm([0.01, 0.5, 0.02]) == [pytest.approx(0.03), 0.5, pytest.approx(0.04)]
     assert sign_test(10, 0) == pytest.approx(2 / 1024)
     assert quantile([3.0, 1.0, 2.0, math.inf], 0.5) == 2.0
 
@@ -225,6 +229,14 @@ def test_report_and_compare_commands(tmp_path, capsys, spring_results):
     assert main(['report', str(tmp_path / 'a')]) == 0
     page = (tmp_path / 'a' / 'index.html').read_text()
     assert page.count('<svg') == 5
+    assert 'Isolation over time' in page
+    assert 'addEventListener' in page  # tables are sorted by a click
+    tex = (tmp_path / 'a' / 'detection.tex').read_text()
+    assert tex.count(r'\\') == 2
+    assert r'f11\_B' in tex
+    isolation = (tmp_path / 'a' / 'isolation.csv').read_text()
+    assert isolation.startswith('detector,after,runs,right,same_law,wrong')
+    assert 'scada,1 min,1,1.0,0.0,0.0' in isolation
     assert 'S1-FF-f11' in page
     assert not re.search(r'(src|href)=["\']?https?:', page)  # nothing is loaded from elsewhere
     assert 'f11_B' in (tmp_path / 'a' / 'README.md').read_text()

@@ -92,7 +92,9 @@ def thinned(columns: Columns, period: float) -> Columns:
     """
     order = np.argsort(columns['stamp'], kind='stable')
     stamp = columns['stamp'][order]
-    slot = (stamp - stamp[0] + int(0.01 * period * NANOSECONDS)) // int(period * NANOSECONDS)
-    _, first = np.unique(slot, return_index=True)
+    if len(stamp) < 2 or float(np.median(np.diff(stamp))) > 0.75 * period * NANOSECONDS:
+        first = np.arange(len(stamp))
+    else:
+        _, first = np.unique((stamp - stamp[0]) // int(period * NANOSECONDS), return_index=True)
     kept = order[first]
     return {name: np.asarray(values)[kept] for name, values in columns.items()}

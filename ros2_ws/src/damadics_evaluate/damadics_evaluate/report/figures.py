@@ -22,7 +22,7 @@ from damadics_evaluate.benchmark.tables import (
 from damadics_evaluate.detectors.find import title_of
 from damadics_evaluate.scenarios.cases import SCENARIOS, case
 
-STEPS = 80  # of a delay curve; more would not be seen
+STEPS = 40  # of a delay curve; more would not be seen
 STRENGTHS = {'S': 0.25, 'M': 0.5, 'B': 0.75}
 OTHERS = ('#e07b00', '#2e8b57', '#8a4fa8', '#c8102e', '#5a6068', '#00838f', '#b58900', '#6b8e23')
 
@@ -45,18 +45,24 @@ def _draw(size: tuple[float, float], draw: Any) -> str:
 
 
 def shrunk(svg: str) -> str:
-    """
-    Return an SVG whose coordinates have two digits after the point.
+    r"""
+    Return an SVG without what no reader sees: names of groups, spaces, the third digit.
 
-    >>> shrunk('<path d="M 1.23456 7.000001"/>')
-    '<path d="M 1.23 7"/>'
+    >>> shrunk('<g id="a"><path d="M 1.23456 7.000001 \nL 2 3"/></g>')
+    '<g><path d="M 1.2 7 L 2 3"/></g>'
     """
 
     def short(match: re.Match[str]) -> str:
-        return f'{float(match[0]):.2f}'.rstrip('0').rstrip('.')
+        return f'{float(match[0]):.1f}'.removesuffix('.0')
 
-    svg = re.sub(r'\d+\.\d{3,}', short, svg)
-    return re.sub(r'\n\s*', '\n', svg)
+    def tight(match: re.Match[str]) -> str:
+        style = match[0].replace('; ', ';').replace(': ', ':')
+        return style.replace("font-family:'DejaVu Sans'", 'font-family:sans-serif')
+
+    svg = re.sub(r'<g id="[^"]*">', '<g>', svg)
+    svg = re.sub(r'style="[^"]*"', tight, svg)
+    svg = re.sub(r'\d+\.\d{2,}', short, svg)
+    return re.sub(r'>\s+<', '><', re.sub(r'\s+', ' ', svg)).replace(' "', '"')
 
 
 def _colours(names: Sequence[str]) -> dict[str, tuple[str, float, str]]:
@@ -242,6 +248,7 @@ def delay_bars(rows: Sequence[dict[str, Any]]) -> str:
         axis.set_yscale('log')
         axis.set_ylim(0.5, 1e6)  # room for the legend
         axis.set_xlim(-0.7, len(names) - 0.3)
+        axis.grid(False, axis='x')
         axis.set_xticks(range(len(names)), names, rotation=90, fontsize=7)
         axis.set_ylabel('median t_dt (s); x: not detected')
         axis.legend(loc='upper left', ncol=2)

@@ -20,6 +20,7 @@ FORM = ('t_dt', 'r_fd', 'r_td', 'f_sd', 't_it', 'r_fi', 'r_ti', 'r_mi', 'f_si', 
 ISOLATION_INDICES = ('t_it', 'r_fi', 'r_ti', 'r_mi', 'f_si', 'dacc_tm', 'dacc')
 OTHER_NAMES = {8: 'twisted piston rod', 14: 'chamber pressure sensor'}
 TIMES = (*LABELS.values(), END)
+CONFUSIONS = 30  # the most frequent ones
 
 
 def grid_of(rows: Sequence[Result], detectors: Sequence[str]) -> list[Result]:
@@ -156,7 +157,7 @@ def confusion(results: Sequence[Result], detector: str) -> list[Result]:
                 counts[r['fault'], last['named'], last['verdict']] += 1
     return [
         {'fault': f'f{fault}', 'named': f'f{named}', 'verdict': judged, 'count': n}
-        for (fault, named, judged), n in counts.most_common()
+        for (fault, named, judged), n in counts.most_common(CONFUSIONS)
     ]
 
 
