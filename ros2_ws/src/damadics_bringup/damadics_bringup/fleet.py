@@ -79,6 +79,16 @@ def read_fleet(path: Path | str) -> list[Valve]:
     return valves
 
 
+def simulated(valves: list[Valve]) -> list[Valve]:
+    """
+    Choose the valves that get a simulated plant: the others have a driver of their own.
+
+    :param valves: the fleet.
+    :return: those with an entry `simulate`; all where none has one.
+    """
+    return [valve for valve in valves if valve.simulate] or valves
+
+
 def spread(valves: list[Valve], processes: int) -> dict[str, list[Valve]]:
     """
     Part a fleet among processes that each run estimators and detectors of several valves.

@@ -17,7 +17,7 @@ from damadics_fd.start import missing_middleware
 from damadics_fd.store.access import AccessError
 from damadics_fd.store.slots import check_folder
 
-from damadics_bringup.fleet import MONITORS, FleetError, Valve, read_fleet, spread
+from damadics_bringup.fleet import MONITORS, FleetError, Valve, read_fleet, simulated, spread
 from damadics_bringup.keeper import USAGE, Keeper, Task
 from damadics_bringup.page_options import check_page, port
 from damadics_bringup.processes import ProcessError, Processes, assignments
@@ -127,7 +127,7 @@ def tasks_of(valves: list[Valve], options: argparse.Namespace) -> list[Task]:
                     enclave=f'/{valve.name}/plant',
                 ),
             )
-            for valve in valves
+            for valve in simulated(valves)
         ]
     return tasks
 
@@ -187,7 +187,9 @@ def parser() -> argparse.ArgumentParser:
         type=Path,
         help='list of the valves (YAML); default: one valve for a first look',
     )
-    p.add_argument('--simulate', action='store_true', help='start a simulated plant per valve')
+    p.add_argument(
+        '--simulate', action='store_true', help='start the plants that the fleet file describes'
+    )
     p.add_argument('--dashboard', action='store_true', help='start the web page')
     p.add_argument('--show', action='store_true', help='open the web page in a browser')
     p.add_argument('--host', default='127.0.0.1', help='address of the web page (127.0.0.1)')

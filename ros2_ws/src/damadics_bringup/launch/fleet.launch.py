@@ -5,7 +5,7 @@
 from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
-from damadics_bringup.fleet import MONITORS, read_fleet, spread
+from damadics_bringup.fleet import MONITORS, read_fleet, simulated, spread
 from damadics_bringup.launcher import arguments_of_all
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
@@ -49,6 +49,8 @@ def valves(context):
             for node in MONITORS
             if not together
         ]
+        if valve not in simulated(fleet):
+            continue  # it has a driver of its own
         actions.append(
             Node(
                 package='damadics_plant',
@@ -87,7 +89,7 @@ def generate_launch_description():
             DeclareLaunchArgument(
                 'simulate',
                 default_value='false',
-                description='start a simulated plant for each valve',
+                description='start the plants that the fleet file describes',
             ),
             DeclareLaunchArgument(
                 'dashboard', default_value='false', description='start the page'

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 import pytest
 import yaml
-from damadics_bringup.fleet import read_fleet
+from damadics_bringup.fleet import read_fleet, simulated
 from damadics_bringup.init import main
 from damadics_fd.core.settings.settings import Settings
 
@@ -46,3 +46,9 @@ def test_files_of_before_are_not_overwritten(tmp_path, capsys):
     assert main([str(tmp_path), '--valve', 'LV-101']) == 2
     assert 'fleet.yaml already' in capsys.readouterr().err
     assert (tmp_path / 'fleet.yaml').read_text() == 'mine'
+
+
+def test_in_a_mixed_fleet_only_the_simulated_valves_get_a_plant(tmp_path):
+    file = tmp_path / 'fleet.yaml'
+    file.write_text('valves: {real: {}, model: {simulate: {rate: 200.0}}}')
+    assert [valve.name for valve in simulated(read_fleet(file))] == ['model']

@@ -7,7 +7,7 @@ import math
 from nicegui import ui
 
 from damadics_dashboard.live.valve import Valve
-from damadics_dashboard.pages.elements import box, markup, redraw, tell
+from damadics_dashboard.pages.elements import box, markup, redraw
 from damadics_dashboard.pages.frame import card
 from damadics_dashboard.pages.plots import Curve, Plot, signature_plot, time_plot
 from damadics_dashboard.words.texts import Texts
@@ -42,6 +42,7 @@ class Signals:
             self._position()
             self.residual = self._residual()
             self._velocity()
+            self._flow()
         with box('div', 'stack'):
             self.signature = self._signature(recent)
             self._process()
@@ -129,20 +130,13 @@ class Signals:
                 ['--cv', '--x1', '--velocity'],
                 t('process_label'),
             )
+
+    def _flow(self) -> None:
+        t = self._t
+        with card(t('signal_flow')):
             self._plot(
-                [Curve(trace, 'flow')],
+                [Curve(self._valve.traces['measurement'], 'flow')],
                 time_plot([t('signal_flow')], 'kg/s'),
                 ['--residual'],
                 t('flow_label'),
             )
-
-
-def draw_all(plot: Plot, series: list, shown: tuple[float, float]) -> None:
-    """
-    Draw a whole plot at once.
-
-    :param plot: the plot.
-    :param series: points of each curve.
-    :param shown: range of the abscissa [s].
-    """
-    tell('push', {plot.id: {'all': True, 'series': series, 'from': [], 'range': shown}})

@@ -75,8 +75,8 @@ class _Page:
         self._head(window)
         self._banner = markup('banner.html', kind='off', title='', detail='', figures=[])
         self._banner.classes('w-full')
-        with box('div', 'w-full', id='alarms'), card(t('alarms'), classes='w-full') as head:
-            self._alarm_head = head
+        self._alarm_box = box('div', 'w-full', id='alarms')
+        with self._alarm_box, card(t('alarms'), classes='w-full'):
             self._alarms = AlarmList(watcher, lambda: (valve,), t, name=False)
         self._grid = box('div', 'grid')
         with self._grid:
@@ -152,7 +152,7 @@ class _Page:
         tell('age', None if old is None else round(old, 1))
         stale = condition.kind == 'off'
         self._grid.classes(add='stale' if stale else '', remove='' if stale else 'stale')
-        self._alarms.update()
+        self._alarm_box.set_visibility(self._alarms.update() > 0)
         if self._watcher.offers(self._valve.name, 'inject_fault') != self._simulated:
             self._simulated = not self._simulated
             self._simulator.clear()
