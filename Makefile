@@ -10,7 +10,7 @@ READERS := tools/npm/node_modules/.package-lock.json
 SOURCES := $(shell find ros2_ws/src -type f -not -name '*.pyc' -not -path '*/__pycache__/*' \
 	-not -path '*/test/*' -not -path '*/.pytest_cache/*')
 
-.PHONY: help demo dashboard test report campaign-monitor build env lint types docs lock licences clean
+.PHONY: help demo demo-plant dashboard test report campaign-monitor build env lint types docs lock licences clean
 
 help: ## show what can be made
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 18
@@ -20,6 +20,9 @@ demo: $(BUILT) ## the paper's two experiments through the running nodes: table, 
 
 dashboard: $(BUILT) ## a simulated valve and the web page at http://127.0.0.1:8080
 	@$(ENV) && ros2 run damadics_bringup run --simulate --dashboard $(ARGS)
+
+demo-plant: $(BUILT) ## a simulated plant behind OPC UA: a fault, and who hears of it when
+	@$(ENV) && ros2 run damadics_bringup demo_plant $(ARGS)
 
 test: $(BUILT) $(READERS) ## run all tests
 	@$(ENV) && python -m pytest -m 'not slow' -o pythonpath=tests $(ARGS)

@@ -31,7 +31,6 @@ DISTRIBUTIONS = {
     'yaml': 'pyyaml',
     'google': 'protobuf',
     'prometheus_client': 'prometheus-client',
-    'fpdf': 'fpdf2',
     'paho': 'paho-mqtt',
 }
 KEYS = {'PIL': 'python3-pil', 'dask': 'python3-dask'}

@@ -24,11 +24,13 @@ setup(
     maintainer_email='maintainers@damadics-fd.example',
     description='Launch files, parameter files, layouts and the demonstration of DAMADICS FD.',
     license='Apache-2.0',
-    extras_require={'test': ['pytest']},
+    extras_require={'test': ['pytest'], 'demo_plant': ['aiomqtt', 'amqtt', 'asyncua']},
     entry_points={
         'console_scripts': [
             'demo = damadics_bringup.demo:main',
+            'demo_plant = damadics_bringup.demo_plant.command:main',
             'init = damadics_bringup.init:main',
+            'opcua_plant = damadics_bringup.demo_plant.opcua_plant:main',
             'policy = damadics_bringup.policy:main',
             'run = damadics_bringup.launcher:main',
         ]

@@ -1,0 +1,185 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""
+The OPC UA connector beside a bare asyncua subscription to the same server, at the same time.
+
+CPU time per changed value of both, start, memory, and whether every change came with its own time:
+`python benchmarks/bench_connect.py --valves 1000 --fast 20 --seconds 20`.
+"""
+
+import argparse
+import asyncio
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import yaml
+
+ROOT = Path(__file__).resolve().parents[1]
+SERVER = ROOT / 'tests' / 'connect' / 'opcua_server.py'
+ENDS = {'cv': 'CV', 'x1': 'PV', 'p1': 'P1', 'p2': 'P2', 't1': 'T1', 'flow': 'FLOW', 'ps': 'PS'}
+TICK = os.sysconf('SC_CLK_TCK')
+
+
+def cpu(pid: int) -> float:
+    """Return the CPU time of a process [s]."""
+    fields = Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()
+    return (int(fields[11]) + int(fields[12])) / TICK
+
+
+def memory(pid: int) -> float:
+    """Return the resident memory of a process [MB]."""
+    for line in Path(f'/proc/{pid}/status').read_text().splitlines():
+        if line.startswith('VmRSS'):
+            return int(line.split()[1]) / 1024
+    return 0.0
+
+
+async def bare(url: str, valves: int, fast: int, seconds: float) -> None:
+    """Subscribe as the library's documentation does, and count."""
+    from asyncua import Client
+
+    class Handler:
+        count = 0
+
+        def datachange_notification(self, node, value, data) -> None:
+            self.count += 1
+            self.newest = data.monitored_item.Value.SourceTimestamp
+
+    handlers = []
+    async with Client(url, timeout=60) as client:
+        for begin, end, interval, queue in (
+            (0, valves, 500, 4),
+            (valves, valves + fast, 20, 102),
+        ):
+            nodes = [
+                client.get_node(f'ns=2;s=LV{n}.{e}')
+                for n in range(begin, end)
+                for e in ENDS.values()
+            ]
+            if nodes:
+                handlers.append(Handler())
+                subscription = await client.create_subscription(interval, handlers[-1])
+                await subscription.subscribe_data_change(nodes, queuesize=queue)
+        print('ready', flush=True)
+        while True:
+            await asyncio.sleep(0.2)
+            print(sum(handler.count for handler in handlers), flush=True)
+
+
+class Follower:
+    """A process whose last line of output is a count."""
+
+    def __init__(self, words: list[str]) -> None:
+        self.process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
+        self.count = 0
+        os.set_blocking(self.process.stdout.fileno(), False)
+
+    def read(self) -> int:
+        """Return the newest count."""
+        for line in self.process.stdout:
+            if line.strip().isdigit():
+                self.count = int(line)
+        return self.count
+
+
+def main() -> None:
+    """Run both and print the comparison."""
+    p = argparse.ArgumentParser(description=__doc__)
+    p.add_argument('--valves', type=int, default=1000, help='at 1 Hz')
+    p.add_argument('--fast', type=int, default=20, help='at 50 Hz')
+    p.add_argument('--seconds', type=float, default=20.0)
+    p.add_argument('--port', type=int, default=48400)
+    p.add_argument('--bare', action='store_true', help=argparse.SUPPRESS)
+    options = p.parse_args()
+    url = f'opc.tcp://127.0.0.1:{options.port}'
+    if options.bare:
+        asyncio.run(bare(url, options.valves, options.fast, options.seconds))
+        return
+    import rclpy
+    from damadics_bringup.processes import executable, free_domain, surroundings
+    from damadics_fd.ros import qos
+    from damadics_msgs.msg import MeasurementBlock
+
+    domain = free_domain()
+    os.environ.update(surroundings(domain))
+    folder = Path(tempfile.mkdtemp())
+    valves = {
+        f'lv{n}': {
+            'period': 1.0 if n < options.valves else 0.02,
+            'signals': {s: {'node': f'ns=2;s=LV{n}.{e}'} for s, e in ENDS.items()},
+        }
+        for n in range(options.valves + options.fast)
+    }
+    config = {'server': url, 'publish': 'blocks', 'valves': valves}
+    (folder / 'plant.yaml').write_text(yaml.safe_dump(config, sort_keys=False))
+    size = [str(options.valves), '--rate', '1', '--fast', str(options.fast)]
+    rclpy.init(domain_id=domain)
+    node = rclpy.create_node('bench')
+    rows: dict[int, set[int]] = {}
+
+    def take(block: MeasurementBlock) -> None:
+        for valve, stamp in zip(block.valve, block.stamp, strict=True):
+            rows.setdefault(valve, set()).add(stamp)
+
+    node.create_subscription(MeasurementBlock, '/measurement_block', take, qos.SAMPLES)
+    children = []
+    try:
+        server = subprocess.Popen([sys.executable, str(SERVER), str(options.port), *size])
+        children.append(server)
+        time.sleep(10.0)
+        library = Follower([sys.executable, __file__, '--bare', *sys.argv[1:]])
+        children.append(library.process)
+        began = time.monotonic()
+        program = executable('damadics_connect', 'opcua')
+        connector = subprocess.Popen([program, str(folder / 'plant.yaml')])
+        children.append(connector)
+        while len(rows) < len(valves) and time.monotonic() - began < 120.0:
+            rclpy.spin_once(node, timeout_sec=0.1)
+            library.read()
+        start = time.monotonic() - began
+        rows.clear()
+        before = cpu(connector.pid), cpu(library.process.pid), library.read()
+        end = time.monotonic() + options.seconds
+        while time.monotonic() < end:
+            rclpy.spin_once(node, timeout_sec=0.1)
+            library.read()
+        ours, theirs = cpu(connector.pid) - before[0], cpu(library.process.pid) - before[1]
+        values = library.read() - before[2]
+        samples = sum(len(stamps) for stamps in rows.values())
+        print(f'{len(valves)} valves: all heard {start:.1f} s after the start')
+        print(
+            f'connector: {samples} samples, {1e6 * ours / max(7 * samples, 1):.1f} us a value, '
+            f'{1e6 * ours / max(samples, 1):.0f} us a sample, {memory(connector.pid):.0f} MB'
+        )
+        print(
+            f'bare asyncua: {values} values, {1e6 * theirs / max(values, 1):.1f} us a value, '
+            f'{memory(library.process.pid):.0f} MB'
+        )
+        ratio = (ours / max(7 * samples, 1)) / max(theirs / max(values, 1), 1e-12)
+        print(f'connector / bare, CPU a value: {ratio:.2f}')
+        for kind, begin, stop, period in (
+            ('1 Hz', 0, options.valves, 10**9),
+            ('50 Hz', options.valves, len(valves), 2 * 10**7),
+        ):
+            mine = [sorted(rows.get(n, ())) for n in range(begin, stop)]
+            steps = [b - a for stamps in mine for a, b in zip(stamps, stamps[1:], strict=False)]
+            exact = sum(stamp % period == 0 for stamps in mine for stamp in stamps)
+            total = sum(map(len, mine))
+            print(
+                f'{kind}: {total} samples, {exact} with the exact source time, '
+                f'{sum(step != period for step in steps)} steps other than the period'
+            )
+    finally:
+        for child in reversed(children):
+            child.terminate()
+            child.wait()
+        node.destroy_node()
+        rclpy.try_shutdown()
+
+
+if __name__ == '__main__':
+    main()
