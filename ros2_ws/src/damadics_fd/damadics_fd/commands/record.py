@@ -19,6 +19,7 @@ from damadics_fd.bag.blackbox import BlackBox
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.spool import Spool
 from damadics_fd.nodes.recorder import Recorder
+from damadics_fd.ros.arguments import command_parser
 from damadics_fd.ros.spin import spin_until
 
 QUIET = 0.02  # [s] without a message after which nothing is on its way any more
@@ -26,10 +27,10 @@ LAST_WAIT = 0.12  # [s] at most, from the signal to the closing of the bag
 
 
 def _arguments(args: list[str]) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(
-        prog='recorder',
-        description='Record topics into an MCAP bag until SIGINT or SIGTERM.',
-        epilog='example: ros2 run damadics_fd recorder measurement fault_flag --out bags/monday',
+    parser = command_parser(
+        'recorder',
+        'Record topics into an MCAP bag until SIGINT or SIGTERM.',
+        'example: ros2 run damadics_fd recorder measurement fault_flag --out bags/monday',
     )
     parser.add_argument('topics', nargs='*', help='topics to record; none means all')
     parser.add_argument('--all', action='store_true', help='record all topics')

@@ -7,7 +7,6 @@ import sys
 from pathlib import Path
 
 import numpy as np
-import yaml
 
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.recording import Recording, find_recordings, parse_maps
@@ -15,9 +14,11 @@ from damadics_fd.commands.commission.errors import CommissioningError
 from damadics_fd.commands.commission.monitor import identify
 from damadics_fd.commands.commission.plot import draw
 from damadics_fd.commands.commission.valve_file import parameter_file
+from damadics_fd.commands.options import add_settings, add_sources, settings_in
 from damadics_fd.core.identified import REFUSED, FaultFree, Identified
 from damadics_fd.core.record import Floats, Ints
 from damadics_fd.core.settings import Settings, SettingsError
+from damadics_fd.ros.arguments import command_parser
 from damadics_fd.store.references import Reference, save_reference
 
 EXAMPLES = """examples:
@@ -36,13 +37,12 @@ def arguments(args: list[str] | None = None) -> argparse.Namespace:
     :param args: words; those of the process where absent.
     :return: the options.
     """
-    parser = argparse.ArgumentParser(
-        prog='commission',
-        epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        description='Identify a valve from fault-free recordings in which it moves both ways for '
+    parser = command_parser(
+        'commission',
+        'Identify a valve from fault-free recordings in which it moves both ways for '
         'some minutes: write its parameter file, and say what will be found with it. Exit code '
         '0: ok or limited, 1: the recordings cannot be used, 3: refused.',
+        EXAMPLES,
     )
     parser.add_argument(
         'recordings', nargs='+', type=Path, metavar='RECORDING', help='MCAP, bag folder or table'
@@ -75,21 +75,8 @@ def arguments(args: list[str] | None = None) -> argparse.Namespace:
         default=30.0,
         help='at most one false alarm in so many days (default 30)',
     )
-    parser.add_argument(
-        '--set',
-        action='append',
-        default=[],
-        metavar='NAME=VALUE',
-        help='a setting from the data sheet: mass, stroke, area, plug_diameter ..',
-    )
-    parser.add_argument('--topic', help='topic of the measurements')
-    parser.add_argument(
-        '--map',
-        action='append',
-        default=[],
-        metavar='SIGNAL=SOURCE[*FACTOR]',
-        help='where a signal is, as for replay',
-    )
+    add_settings(parser, 'a setting from the data sheet: mass, stroke, area, plug_diameter ..')
+    add_sources(parser)
     options = parser.parse_args(args)
     if not options.days > 0.0:
         parser.error('--days must be positive')
@@ -136,15 +123,7 @@ def data_sheet(texts: list[str], mode: str = 'monitor') -> tuple[Settings, set[s
     :return: the settings, and the names that were given.
     :raises SettingsError: listing every mistake.
     """
-    values = {}
-    for text in texts:
-        name, equals, value = text.partition('=')
-        if not equals:
-            raise SettingsError([f'--set {text}: write NAME=VALUE'])
-        try:
-            values[name] = yaml.safe_load(value)
-        except yaml.YAMLError as error:
-            raise SettingsError([f'--set {text}: the value cannot be read']) from error
+    values = settings_in(texts)
     return Settings.for_mode(mode, **values), set(values)
 
 

@@ -21,6 +21,7 @@ from damadics_fd.bag.errors import BagError, NoMeasurementError, printable
 from damadics_fd.bag.inspection import LOSSY
 from damadics_fd.bag.mcap import loading
 from damadics_fd.bag.recording import Recording, find_recordings, parse_maps
+from damadics_fd.commands.options import add_settings, add_sources, settings_in
 from damadics_fd.commands.replay.bags import Plan, replay, warm_up
 from damadics_fd.commands.replay.outcome import Outcome
 from damadics_fd.commands.replay.output import (
@@ -33,7 +34,7 @@ from damadics_fd.core.modes import MODES
 from damadics_fd.core.monitor import estimator_for
 from damadics_fd.core.settings import Settings, SettingsError
 from damadics_fd.core.settings.document import parameters_in
-from damadics_fd.ros.arguments import split_ros_args
+from damadics_fd.ros.arguments import command_parser, split_ros_args
 from damadics_fd.store.references import ReferenceFileError, load_reference
 
 EXAMPLES = """examples:
@@ -53,11 +54,8 @@ _counter: Any = None  # samples done by all workers
 
 def arguments(args: list[str] | None = None) -> argparse.Namespace:
     """Parse and check the command line."""
-    parser = argparse.ArgumentParser(
-        prog='replay',
-        epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        description='Replay recorded bags or tables through estimator and detector.',
+    parser = command_parser(
+        'replay', 'Replay recorded bags or tables through estimator and detector.', EXAMPLES
     )
     parser.add_argument(
         'bags',
@@ -76,22 +74,8 @@ def arguments(args: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument(
         '--settings', type=Path, metavar='FILE', help='parameter file of the nodes (YAML)'
     )
-    parser.add_argument(
-        '--set',
-        action='append',
-        default=[],
-        metavar='NAME=VALUE',
-        help='one setting; may be repeated',
-    )
-    parser.add_argument('--topic', help='topic of the measurements; by default all of them')
-    parser.add_argument(
-        '--map',
-        action='append',
-        default=[],
-        metavar='SIGNAL=SOURCE',
-        help='where a signal is: /topic.field in a bag, a column in a table; then [UNIT], *FACTOR,'
-        ' +OFFSET, invert as needed: x1=POS[%%] invert',
-    )
+    add_settings(parser, 'one setting')
+    add_sources(parser)
     parser.add_argument(
         '--actuator',
         type=int,
@@ -153,14 +137,7 @@ def settings_of(options: argparse.Namespace) -> dict[str, Any]:
     values: dict[str, Any] = {}
     if options.settings:
         values |= _parameters(options.settings)
-    for text in options.set:
-        name, equals, value = text.partition('=')
-        if not equals:
-            raise SettingsError([f'--set {text}: write NAME=VALUE'])
-        try:
-            values[name] = yaml.safe_load(value)
-        except yaml.YAMLError as error:
-            raise SettingsError([f'--set {text}: the value cannot be read']) from error
+    values |= settings_in(options.set)
     values.pop('mode', None)
     Settings.for_mode(options.mode, **values)
     return values

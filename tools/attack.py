@@ -1,0 +1,338 @@
+#!/usr/bin/env python3
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Attack running nodes: damaged state files, odd requests, processes killed and stopped.
+
+    make attack ARGS='--files 2000 --requests 1000 --signals 200'
+
+Counts what must not happen: a lost alarm, "healthy" for longer than 2 s about old samples, the end
+of a process. Shares no code with the tests. Exit code 1 where anything was found.
+"""
+
+import argparse
+import json
+import math
+import os
+import random
+import signal
+import string
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from pathlib import Path
+
+import rclpy
+from ament_index_python.packages import get_package_prefix
+from damadics_msgs.msg import FaultFlag, Measurement
+from damadics_msgs.srv import Acknowledge, Reference, Relearn, ResetAlarm, Shelve
+from lifecycle_msgs.srv import ChangeState
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.qos import DurabilityPolicy, QoSProfile
+
+CONFIGURE, CLEANUP, ACTIVATE, DEACTIVATE = 1, 2, 3, 4
+UNKNOWN, HEALTHY = FaultFlag.STATE_UNKNOWN, FaultFlag.STATE_HEALTHY
+PERIOD = 0.01  # s between two samples
+PAPER = {'mode': 'paper', 'sample_rate': 100.0, 'latch': True, 'off_delay': 0.3, 'gw': 0.1}
+ODD_NUMBERS = (math.nan, math.inf, -math.inf, -1.0, 0.0, 5e-324, 1e-12, 1e308, 2.0**62)
+LATCHED = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+class Prey:
+    """A detector and an estimator of one valve, and what they say."""
+
+    def __init__(self, folder: Path, seed: int) -> None:
+        self.random = random.Random(seed)
+        self.found: Counter[str] = Counter()
+        self.folder = folder
+        self.node = rclpy.create_node('attack')
+        self.executor = SingleThreadedExecutor()
+        self.executor.add_node(self.node)
+        self.flags: list[FaultFlag] = []
+        self.node.create_subscription(FaultFlag, 'fault_flag', self.flags.append, LATCHED)
+        self.samples = self.node.create_publisher(Measurement, 'measurement', 1000)
+        self.zero = time.monotonic()
+        self.sent = 0
+        self.processes: dict[str, subprocess.Popen[bytes]] = {}
+        self.clients: dict[str, object] = {}
+
+    def start(self, name: str, **values: object) -> None:
+        """Start a node with parameters."""
+        program = Path(get_package_prefix('damadics_fd'), 'lib', 'damadics_fd', name)
+        words = [str(program), '--ros-args']
+        for key, value in {**PAPER, **values}.items():
+            words += ['-p', f'{key}:={json.dumps(value)}']
+        log = (self.folder / f'{name}.log').open('ab')
+        self.processes[name] = subprocess.Popen(words, stdout=log, stderr=log)
+
+    def spin(self, seconds: float, until=lambda: False) -> bool:
+        """Take messages until something has come about."""
+        end = time.monotonic() + seconds
+        while not until() and time.monotonic() < end:
+            self.executor.spin_once(timeout_sec=0.01)
+        return bool(until())
+
+    def drive(self, seconds: float, throw: bool = False, until=lambda: False) -> bool:
+        """Send samples in real time."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end and not until():
+            due = int((time.monotonic() - self.zero) / PERIOD)
+            for number in range(max(self.sent + 1, due - 50), due + 1):
+                message = Measurement(cv=0.5, x1=0.5, p1=3.5e6, p2=2.6e6, t1=20.0, flow=5.0)
+                message.ps = math.nan
+                message.x1 += 0.1 * (number // 20 % 2) if throw else 0.0
+                message.header.stamp.sec, hundredths = divmod(number, round(1 / PERIOD))
+                message.header.stamp.nanosec = hundredths * 10_000_000
+                message.header.frame_id = 'PREY'
+                self.samples.publish(message)
+            self.sent = due
+            self.executor.spin_once(timeout_sec=PERIOD)
+        return bool(until())
+
+    def call(self, kind: type, name: str, patience: float = 10.0, drive: bool = False, **request):
+        """Call a service; None where it does not answer."""
+        if name not in self.clients:
+            self.clients[name] = self.node.create_client(kind, name)
+        client = self.clients[name]
+        turn = self.drive if drive else self.spin
+        if not turn(patience, until=client.service_is_ready):
+            return None
+        future = client.call_async(kind.Request(**request))
+        turn(patience, until=future.done)
+        return future.result() if future.done() else None
+
+    def transit(self, node: str, step: int) -> bool:
+        """Ask for a transition of the life cycle."""
+        request = ChangeState.Request()
+        request.transition.id = step
+        answer = self.call(
+            ChangeState, f'{node}/change_state', 20.0, transition=request.transition
+        )
+        return answer is not None and answer.success
+
+    def ended(self) -> list[str]:
+        """Return the names of processes that have ended."""
+        return [name for name, process in self.processes.items() if process.poll() is not None]
+
+
+def mutated(data: bytes, chance: random.Random) -> bytes | None:
+    """Return damaged bytes; None to make a folder of it."""
+    kind = chance.randrange(12)
+    if kind == 0:
+        return data[: chance.randrange(len(data) + 1)]
+    if kind == 1:
+        return b''
+    if kind == 2:
+        return bytes(len(data))
+    if kind == 3:
+        return None
+    if kind == 4:
+        return b'[' * 50_000
+    if kind == 5:
+        return data.replace(b'true', chance.choice([b'false', b'"yes"', b'1', b'null']))
+    if kind == 6:
+        digits = [n for n, byte in enumerate(data) if 48 <= byte < 58]
+        place = chance.choice(digits)
+        new = chance.choice([b'-1', b'9' * 5000, b'NaN', b'1e999', b'[]', b'4294967296'])
+        return data[:place] + new + data[place + 1 :]
+    if kind == 7:
+        lines = data.splitlines(keepends=True)
+        chance.shuffle(lines)
+        return b''.join(lines)
+    damaged = bytearray(data)
+    for _ in range(chance.randint(1, 8)):
+        place = chance.randrange(len(damaged))
+        damaged[place] = chance.randrange(256)
+    return bytes(damaged)
+
+
+def put(file: Path, data: bytes | None) -> None:
+    """Write a file, or make a folder of it."""
+    if file.is_dir():
+        file.rmdir()
+    if data is None:
+        file.unlink(missing_ok=True)
+        file.mkdir()
+    else:
+        file.write_bytes(data)
+
+
+def attack_files(prey: Prey, count: int) -> None:
+    """Damage what is kept, configure the nodes anew, look at the first flag."""
+    alarms = prey.folder / 'alarms'
+    prey.start('estimator', reference=str(prey.folder / 'reference'))
+    prey.start('detector', alarm_folder=str(alarms), signature_folder=str(alarms / 'signature'))
+    assert prey.spin(300.0, lambda: bool(prey.flags)), 'the detector does not start'
+    for _ in range(60):
+        if prey.drive(1.0, True, lambda: prey.flags[-1].fault):
+            break
+    assert prey.flags[-1].fault, 'there is no alarm to lose'
+    prey.drive(2.0)
+    wanted = prey.flags[-1].occurrence
+    kept = {f: f.read_bytes() for f in alarms.rglob('*') if f.is_file()}
+    prey.transit('detector', DEACTIVATE)
+    prey.transit('detector', CLEANUP)
+    for n in range(count):
+        for file in [f for f in alarms.rglob('*') if '.bad-' in f.name]:
+            file.rmdir() if file.is_dir() else file.unlink()
+        for file, data in kept.items():
+            put(file, data)
+        chosen = [f for f in kept if prey.random.random() < 0.9] or list(kept)
+        for file in chosen:
+            put(file, mutated(kept[file], prey.random))
+        before = len(prey.flags)
+        if not prey.transit('detector', CONFIGURE):
+            prey.found['not configured'] += 1
+        elif not prey.spin(5.0, lambda b=before: len(prey.flags) > b):
+            prey.found['no flag'] += 1
+        else:
+            flag = prey.flags[-1]
+            safe = flag.state == UNKNOWN or (flag.fault and flag.occurrence == wanted)
+            if not safe:
+                prey.found['lost alarm'] += 1
+                print('lost:', n, flag.state, flag.fault, flag.occurrence, flush=True)
+            prey.found['shown as unknown' if flag.state == UNKNOWN else 'kept'] += 1
+        prey.transit('detector', CLEANUP)
+        if prey.ended():
+            prey.found['process ended'] += 1
+            print('ended:', n, prey.ended(), flush=True)
+            return
+    prey.transit('detector', CONFIGURE)
+    prey.transit('detector', ACTIVATE)
+
+
+def text(chance: random.Random) -> str:
+    """Return a text that somebody might send."""
+    return chance.choice(
+        [
+            '',
+            '"><script>x</script>',
+            '\x1b[31m\n\r\t',
+            'x' * 100_000,
+            '../../etc/passwd',
+            '/proc/self/mem',
+            '\u202e\u0000ä',
+            ''.join(chance.choices(string.printable, k=50)),
+        ]
+    )
+
+
+def attack_services(prey: Prey, count: int) -> None:
+    """Send odd requests; each is answered, and no process ends."""
+    chance = prey.random
+    for n in range(count):
+        signed = {'user': text(chance), 'comment': text(chance)}
+        kind, name, request = chance.choice(
+            [
+                (Acknowledge, 'acknowledge', {'occurrence': chance.choice((0, 1, 7, 2**32 - 1))}),
+                (ResetAlarm, 'reset', {}),
+                (Shelve, 'shelve', {'duration': chance.choice(ODD_NUMBERS)}),
+                (Relearn, 'relearn', {}),
+                (Reference, 'save_reference', {'path': text(chance)}),
+                (Reference, 'load_reference', {'path': text(chance)}),
+                (ChangeState, 'detector/change_state', {}),
+                (ChangeState, 'estimator/change_state', {}),
+            ]
+        )
+        if kind is ChangeState:
+            wanted = ChangeState.Request().transition
+            wanted.id = chance.choice((3, 8, 50, 60, 200, 255))
+            request = {'transition': wanted}
+        elif kind is not Reference:
+            request |= signed
+        if prey.call(kind, name, 10.0, drive=True, **request) is None:
+            prey.found[f'no answer from {name}'] += 1
+        if prey.ended():
+            prey.found['process ended'] += 1
+            print('ended:', n, name, request, flush=True)
+            return
+
+
+def attack_signals(prey: Prey, count: int) -> None:
+    """Stop and kill nodes at random times; look for an old judgement that is called healthy."""
+    alarms = str(prey.folder / 'alarms')
+    chance = prey.random
+    old_since = 0.0
+    worst = 0.0
+    seen = len(prey.flags)
+
+    def judge() -> None:
+        nonlocal seen, old_since, worst
+        for flag in prey.flags[seen:]:
+            stamp = flag.header.stamp.sec + 1e-9 * flag.header.stamp.nanosec
+            age = time.monotonic() - prey.zero - stamp
+            if flag.state == HEALTHY and age > 2.5:
+                old_since = old_since or time.monotonic()
+                worst = max(worst, time.monotonic() - old_since)
+            else:
+                old_since = 0.0
+        seen = len(prey.flags)
+
+    for _ in range(count):
+        name = chance.choice(('estimator', 'detector'))
+        process = prey.processes[name]
+        if chance.random() < 0.5:
+            process.send_signal(signal.SIGSTOP)
+            prey.drive(chance.uniform(0.1, 4.0))
+            process.send_signal(signal.SIGCONT)
+        else:
+            fault = prey.flags[-1].fault
+            process.kill()
+            process.wait()
+            folders = {'alarm_folder': alarms} if name == 'detector' else {}
+            prey.start(name, **folders)
+            before = len(prey.flags)
+            if name == 'detector':
+                prey.drive(60.0, until=lambda b=before: len(prey.flags) > b)
+                first = prey.flags[before] if len(prey.flags) > before else None
+                if first is None or (fault and not first.fault and first.state != UNKNOWN):
+                    prey.found['lost alarm'] += 1
+        end = time.monotonic() + chance.uniform(0.5, 3.0)
+        while time.monotonic() < end:
+            prey.drive(0.1)
+            judge()
+    prey.found['seconds of old health (worst, ms)'] = round(1e3 * worst)
+    if worst > 2.0:
+        prey.found['false healthy'] += 1
+
+
+def main() -> int:
+    """
+    Run the attack.
+
+    :return: 0, or 1 where something was found.
+    """
+    p = argparse.ArgumentParser(prog='attack', description=__doc__.split('\n')[1])
+    p.add_argument('--files', type=int, default=2000, help='sets of damaged files (2000)')
+    p.add_argument('--requests', type=int, default=1000, help='odd requests (1000)')
+    p.add_argument('--signals', type=int, default=200, help='SIGSTOP and SIGKILL (200)')
+    p.add_argument('--seed', type=int, default=1)
+    options = p.parse_args()
+    os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    os.environ.setdefault('ROS_DOMAIN_ID', str(random.SystemRandom().randint(1, 99)))
+    with tempfile.TemporaryDirectory() as folder:
+        rclpy.init()
+        prey = Prey(Path(folder), options.seed)
+        try:
+            attack_files(prey, options.files)
+            attack_services(prey, options.requests)
+            attack_signals(prey, options.signals)
+        finally:
+            for process in prey.processes.values():
+                process.kill()
+            traces = sum(
+                file.read_text(errors='replace').count('Traceback')
+                for file in prey.folder.glob('*.log')
+            )
+            rclpy.try_shutdown()
+    prey.found['tracebacks in the logs'] = traces
+    for what, number in sorted(prey.found.items()):
+        print(f'{number:7d}  {what}')
+    bad = ('lost', 'ended', 'false', 'not configured', 'no flag', 'no answer')
+    return int(traces > 0 or any(n for what, n in prey.found.items() if what.startswith(bad)))
+
+
+if __name__ == '__main__':
+    sys.exit(main())
