@@ -5,8 +5,8 @@
 import math
 from dataclasses import dataclass
 
-R1, R2, P1, P2, T1 = range(5)
-RESIDUALS = ('r1', 'r2', 'p1', 'p2', 't1')
+R1, R2, P1, P2, T1, PROCESS = range(6)
+RESIDUALS = ('r1', 'r2', 'p1', 'p2', 't1', 'process')
 NO_CLIP = 1e9
 
 
@@ -57,6 +57,7 @@ TESTS = (
     Cusum(P2, 0.5, 5, 4.0, 1.2, 0.0),
     Cusum(T1, 1.5, 1, NO_CLIP, 1.3, 0.0),
     Cusum(T1, 0.3, 10, 4.0, 1.3, 0.0),
+    Cusum(PROCESS, 0.5, 1, 1.0, 0.0, 1.0),
 )
 FRICTION_TEST = len(TESTS)
 TEST_NAMES = (*(test.name for test in TESTS), 'friction LLR')

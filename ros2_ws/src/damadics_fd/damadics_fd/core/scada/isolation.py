@@ -9,7 +9,6 @@ bounded below by what the fault-free record shows; the smallest cost ranks first
 """
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,7 @@ from numpy.typing import NDArray
 
 from damadics_fd.core.jit import jit
 from damadics_fd.core.scada.actuator import F_RANGE, P_RANGE, T_RANGE, valve_flow
-from damadics_fd.core.scada.cusum import P1, P2, R2, T1, TESTS
+from damadics_fd.core.scada.cusum import P1, P2, PROCESS, R2, T1, TESTS
 from damadics_fd.core.scada.model import (
     COARSE_SUB_STEPS,
     FAULTS,
@@ -26,107 +25,26 @@ from damadics_fd.core.scada.model import (
     advance_stem,
     copy_stem,
 )
-from damadics_fd.core.scada.state import HISTORY_LENGTH
+from damadics_fd.core.scada.names import EQUAL, GROUPS, NAMES, Hypothesis, Isolation, group_of
+from damadics_fd.core.scada.state import HISTORY_LENGTH, LAW
+from damadics_fd.core.scada.witness import by_witnesses
+
+__all__ = ['GROUPS', 'NAMES', 'Hypothesis', 'Isolation', 'Isolator', 'group_of']
 
 WINDOW = 600  # samples at most
 FIRST = 240  # of them for the coarse search
-SHORTEST = 20
+SHORTEST = 5
+LINGERS_S = 3.0  # after the last evidence the record still tells of the fault
 MINIMUM_ERROR = 1e-12
 INCIPIENT_ONLY = frozenset({3, 4, 5, 6, 9})  # no physical background as abrupt faults
+PROCESS_FIRST_S = 3.0
 ABRUPT_PRIOR = 8.0  # nats against them after an abrupt onset
-EQUAL = 4.0  # nats within which two faults are not told apart
-NAMES = {
-    1: 'valve clogging',
-    2: 'plug or seat sedimentation',
-    3: 'plug or seat erosion',
-    4: 'valve or bushing friction',
-    5: 'external leakage',
-    6: 'internal leakage',
-    7: 'evaporation or critical flow',
-    9: 'servomotor housing leak',
-    10: 'diaphragm perforation',
-    11: 'servomotor spring',
-    12: 'electro-pneumatic transducer',
-    13: 'stem position sensor',
-    15: 'positioner feedback',
-    16: 'supply pressure drop',
-    17: 'pressure change across the valve',
-    18: 'bypass opened',
-    19: 'flow sensor',
-}
-GROUPS = {
-    'medium': (7,),
-    'pressures': (17,),
-    'flow path or flow sensor': (5, 6, 18, 19),
-    'plug, seat or position sensor': (2, 3, 13),
-    'actuator or positioner': (1, 4, 9, 10, 11, 12, 15, 16),
-}
 TWO_SIDED = frozenset({12, 13, 19})
 FLOW_FAULTS = frozenset({2, 3, 5, 6, 13, 18, 19})
 HYPOTHESES = tuple(n for n in NAMES if n not in (7, 17))
 GRID = (0.03, 0.15, 0.35, 0.6, 0.85)
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 REFINED = 6  # hypotheses whose strength is refined
-
-
-@dataclass(frozen=True)
-class Hypothesis:
-    """
-    One fault as an explanation.
-
-    :param fault: number of the benchmark.
-    :param strength: fitted strength.
-    :param cost: negative log-likelihood, nats; only differences mean something.
-    """
-
-    fault: int
-    strength: float
-    cost: float
-
-
-@dataclass(frozen=True)
-class Isolation:
-    """
-    Faults that explain the record since the onset, best first.
-
-    :param t: time of the last sample used, s.
-    :param samples: samples used.
-    :param ranking: hypotheses in ascending order of cost.
-    """
-
-    t: float
-    samples: int
-    ranking: tuple[Hypothesis, ...]
-
-    @property
-    def best(self) -> Hypothesis:
-        """Return the explanation that fits best."""
-        return self.ranking[0]
-
-    @property
-    def group(self) -> str:
-        """Return the group of the best explanation."""
-        return group_of(self.best.fault)
-
-    @property
-    def candidates(self) -> tuple[int, ...]:
-        """Return the faults that the record does not tell apart from the best one."""
-        return tuple(h.fault for h in self.ranking if h.cost <= self.best.cost + EQUAL)
-
-    def text(self) -> str:
-        """Return one line for the person who gets the alarm."""
-        named = ' or '.join(f'f{fault} {NAMES[fault]}' for fault in self.candidates[:3])
-        return f'{self.group}: {named}, strength {self.best.strength:+.2f}'
-
-
-def group_of(fault: int) -> str:
-    """
-    Return the group of a fault, 'not observable' where the signals do not show it.
-
-    >>> group_of(4)
-    'actuator or positioner'
-    """
-    return next((name for name, faults in GROUPS.items() if fault in faults), 'not observable')
 
 
 @jit
@@ -188,6 +106,25 @@ def _flow_error(window: np.ndarray, act: Any, fault: Any, g0: float, g1: float) 
     return total / n if n else math.nan
 
 
+def last_evidence(state: Any) -> float:
+    """Return until when the record tells of the present fault, s."""
+    return float(state['t_evidence']) + LINGERS_S
+
+
+def misfit(error: float, variance: float) -> float:
+    """
+    Return the cost of a mean squared error, per half a sample, nats.
+
+    Above the variance of the fault-free record that of an unknown variance, below it that of the
+    known one: there, too, less error is a better explanation.
+
+    >>> misfit(1.0, 1.0), round(misfit(2.0, 1.0), 3), misfit(0.5, 1.0)
+    (0.0, 0.693, -0.5)
+    """
+    ratio = max(error, MINIMUM_ERROR) / max(variance, MINIMUM_ERROR)
+    return math.log(ratio) if ratio > 1.0 else ratio - 1.0
+
+
 class Isolator:
     """
     Rank the faults for one monitor.
@@ -222,6 +159,9 @@ class Isolator:
         window = self._window(state)
         if len(window) < SHORTEST:
             return None
+        ref = self._ref
+        if ref['stem_kind'] == LAW or ref['flow_kind'] == LAW:
+            return by_witnesses(state, ref, window)
         if abrupt is None:
             test = int(state['test'])
             abrupt = test < len(TESTS) and TESTS[test].k0 >= 1.5
@@ -253,7 +193,7 @@ class Isolator:
         kept = min(count, HISTORY_LENGTH)
         order = np.arange(count - kept, count) % HISTORY_LENGTH
         window = state['history'][order]
-        window = window[window['t'] > state['t_onset']]
+        window = window[(window['t'] > state['t_onset']) & (window['t'] <= last_evidence(state))]
         self._late = len(window) > WINDOW
         return np.ascontiguousarray(window[-WINDOW:])
 
@@ -265,6 +205,9 @@ class Isolator:
             if test.residual >= P1 and state['ratios'][i] >= 1.0
         }
         p1, p2 = self._ref['pressure']['mean']
+        if not math.isnan(float(state['t_shown'][PROCESS])):
+            if state['t_shown'][PROCESS] <= np.nanmin(state['t_shown']) + PROCESS_FIRST_S:
+                return [Hypothesis(17, math.nan, 0.0)]
         if T1 in fired:
             shift = T_RANGE * float(np.nanmean(window['t1']) - self._mean_t1)
             if shift > 0.0:
@@ -309,9 +252,9 @@ class Isolator:
             faults if fault in FLOW_FAULTS else None,
         )
         n = 0.5 * len(window)
-        total = n * math.log(max(stem, self._variance[0], MINIMUM_ERROR))
+        total = n * misfit(stem, self._variance[0])
         if not math.isnan(flow):
-            total += n * math.log(max(flow, self._variance[1], MINIMUM_ERROR))
+            total += n * misfit(flow, self._variance[1])
         return total
 
     def _grid(self, window: NDArray, fault: int) -> list[tuple[float, float]]:

@@ -1,54 +1,61 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Learn the reference of one valve from a fault-free record: filters, bias, sigmas, limits."""
+"""Learn the reference of one valve from a fault-free record: models, bias, sigmas, limits."""
 
 import math
 from dataclasses import dataclass
-from statistics import NormalDist
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from damadics_fd.core.jit import jit
-from damadics_fd.core.scada.cusum import R1, R2, TESTS, siegmund_limit
+from damadics_fd.core.scada.clean import despiked, period_of, split
+from damadics_fd.core.scada.cusum import R1, R2, T1
+from damadics_fd.core.scada.fit_flow import FlowFit, better_medium
+from damadics_fd.core.scada.fit_stem import Piece, StemFit, fit_stem
+from damadics_fd.core.scada.limits import friction_limit, set_limits
+from damadics_fd.core.scada.plausible import LearningError, check_flow, check_stem
 from damadics_fd.core.scada.pressure import learn_pressure
+from damadics_fd.core.scada.residuals import residuals
+from damadics_fd.core.scada.robust import Floats, huber_weights, loss_of, spread_of
 from damadics_fd.core.scada.settings import ScadaSettings
-from damadics_fd.core.scada.state import BASIC_WEIGHTS, MONITOR, N_WEIGHTS, REFERENCE
-from damadics_fd.core.scada.step import LLR_CLIP, predict
+from damadics_fd.core.scada.state import (
+    BASIC_WEIGHTS,
+    LAW,
+    MONITOR,
+    N_RESIDUALS,
+    N_WEIGHTS,
+    NOMINAL,
+    REFERENCE,
+)
+from damadics_fd.core.scada.step import predict
 
-Floats = NDArray[np.float64]
-DAY_S = 86400.0
-LONG_RECORD = 3000  # samples below which the tails of r1 are not known well enough
-JUMP_CLIP = 6.0  # a jump must then last for three samples
-HEAD_ROOM = 1.3  # on the largest CUSUM of the learning record
-LLR_MARGINS = (1.6, 2.2)  # with stationary inputs, with wandering ones
-LLR_HEAD_ROOM = 2.0
 RIDGE = 1e-4
-STATIONARY = 1.3  # sigma of 30 s blocks over sigma of samples, above it an input wanders
 EARNED = 0.9  # the further regressors must cut the variance of the second half to this share
-MINIMUM_TRAVEL = 0.5
-# Standard errors of the learned mean by which the allowance grows, by length of block.
-STANDARD_ERRORS = {1: 0.0, 5: 4.0, 10: 4.0, 30: 5.0}
-SLOW = 30  # block of the tests that sum up hundreds of samples
+STATED = 0.8  # share to which the stated actuator must cut the variance of an identified law
+# ... or equal it and leave no more than the sensors' noise
+NEARLY, SENSOR = 1.1, 1.5
+LEAST_SAMPLES = 200
 NEVER = 9.0  # a change of CV, which is 0..1, is never as large
 JUMPS = (0.05, 3.0)  # a jump of CV is more than this, and than this times the largest learned
+STATED_FLOW = (1.5, 0.1, 0.05)  # sigma, gain and offset with which the stated flow law is right
+SWING = (0.25, 2.0)  # of the pressure drop, of the largest change learned
+T, CV, X, PRESSURE_1, PRESSURE_2, TEMPERATURE, FLOW = range(7)
 
-
-class LearningError(ValueError):
-    """The record cannot serve as a reference; the message names cause and remedy."""
+__all__ = ['LearningError', 'learn']
 
 
 @dataclass(frozen=True)
 class Prediction:
-    """Models and regressors over a record, one row per sample."""
+    """Stated models and regressors over a record, one row per sample."""
 
     phi: Floats
     xm: Floats
     xd: Floats
     f: Floats
     sq: Floats
-    innovation: Floats
+    f_model: Floats
     masked: NDArray[np.bool_]
 
 
@@ -65,104 +72,134 @@ def _predict_record(
     for i in range(samples.shape[0]):
         r = samples[i]
         predict(s, settings[0], reference[0], r[0], r[1], r[2], r[3], r[4], r[5], r[6])
+        residuals(s, reference[0], r[2], r[3], r[4], r[5], r[6])
         phi[i, :] = s.phi
         models[i, 0] = s.xm[0]
         models[i, 1] = s.xd
         models[i, 2] = s.f
         models[i, 3] = s.sq
-        models[i, 4] = s.innovation[0]
-        models[i, 5] = s.innovation[1]
-        models[i, 6] = 1.0 if s.masked else 0.0
+        models[i, 4] = s.f_model
+        models[i, 5] = 1.0 if s.masked else 0.0
+        for k in range(N_RESIDUALS):
+            models[i, 6 + k] = s.residual[k] if s.testable[k] > 0 else math.nan
 
 
-@jit
-def cusum_maximum(z: np.ndarray, k: float, clip: float) -> float:
-    """Return the largest value of the two-sided CUSUM over a record of z values."""
-    up = 0.0
-    down = 0.0
-    largest = 0.0
-    for value in z:
-        if math.isnan(value):
-            continue
-        v = min(max(value, -clip), clip)
-        up = max(0.0, up + v - k)
-        down = max(0.0, down - v - k)
-        largest = max(largest, up, down)
-    return largest
-
-
-@jit
-def _llr_maximum(gain: np.ndarray) -> float:
-    g = 0.0
-    largest = 0.0
-    for value in gain:
-        g = max(0.0, g + min(max(value, -LLR_CLIP), LLR_CLIP))
-        largest = max(largest, g)
-    return largest
-
-
-def block_sigma(values: Floats, length: int) -> float:
-    """
-    Return sqrt(L) times the deviation of the means of non-overlapping blocks of L samples.
-
-    :param values: residual, shape (n,).
-    :param length: L; 1 gives the ordinary standard deviation.
-    :return: sigma that a sum over L samples shows, with the autocorrelation in it.
-    """
-    n = values.size // length
-    if n < 2:
-        return float(values.std())
-    means = values[: n * length].reshape(n, length).mean(axis=1)
-    return float(math.sqrt(length) * means.std())
-
-
-def learn(samples: Floats, settings: ScadaSettings) -> NDArray:
+def learn(
+    samples: Floats, settings: ScadaSettings, until: float | None = None, notes: list[str] | None = None
+) -> NDArray:
     """
     Return the reference learned from a fault-free record (sheet section 1.3).
 
     :param samples: rows t (s), CV, X', P1', P2', T1', F' (0..1, NaN where not measured), from
         the start of the record on.
     :param settings: the window to learn from, the budget, the actuator.
+    :param until: end of the window since the start, s; that of the settings by default.
+    :param notes: receives what a person should know about what was learned.
     :return: structured array of `REFERENCE`, length 1.
-    :raises LearningError: for a record that is too short or in which the valve hardly moves.
+    :raises LearningError: for a record that is too short, in which the valve hardly moves or that
+        does not look like a valve that works.
     """
-    t = samples[:, 0] - samples[0, 0]
-    window = (t >= settings.learn_from_s) & (t < settings.learn_s)
+    t = samples[:, T] - samples[0, T]
+    window = (t >= settings.learn_from_s) & (t < (settings.learn_s if until is None else until))
     n = int(window.sum())
-    if n < 200:
-        raise LearningError(f'{n} samples after {settings.learn_from_s:g} s: record 200 or more')
-    travel = float(np.abs(np.diff(samples[window, 2])).sum())
-    if travel < MINIMUM_TRAVEL:
+    if n < LEAST_SAMPLES:
         raise LearningError(
-            f'the valve travelled {travel:.2f} of its stroke: learn while it works, '
-            f'{MINIMUM_TRAVEL:g} or more'
+            f'{n} samples after {settings.learn_from_s:g} s: record {LEAST_SAMPLES} or more'
         )
+    clean = despiked(samples)
+    part = clean[window]
     reference = np.zeros(1, REFERENCE)
     ref = reference[0]
-    ref['n'] = n
-    ref['dp_mean'] = float(np.mean(samples[window, 3] - samples[window, 4]))
-    for i, column in enumerate((3, 4)):
-        learn_pressure(samples[window, column], settings.sigma, ref['pressure'][i : i + 1])
-    x = samples[window, 2]
-    candidates = [_predict(samples, settings, reference, window, hold) for hold in (False, True)]
-    _, hold, used = min(
+    ref['n'], ref['period'], ref['seconds'] = n, period_of(samples[:, T]), np.ptp(part[:, T])
+    with np.errstate(all='ignore'):
+        measured = np.isfinite(part).mean(axis=0) > 0.5
+    ref['signals'] = int(sum(1 << i for i in range(7) if measured[i]))
+    for i in np.flatnonzero(measured):
+        ref['low'][i], ref['high'][i] = np.nanmin(part[:, i]), np.nanmax(part[:, i])
+    pieces = _pieces(part, settings, float(ref['period']))
+    identified = fit_stem(pieces, float(ref['period']))
+    check_stem(identified, part[:, CV], part[:, X])
+    ref['stem_law'] = identified.law[0]
+    pressures = bool(measured[PRESSURE_1] and measured[PRESSURE_2])
+    wandering = True
+    prediction = None
+    if pressures:
+        _learn_inputs(ref, reference, part, settings)
+        prediction = _choose_stem(ref, reference, clean, part, settings, window, identified)
+        wandering = not all(stationary(v) for v in part[:, 3:6].T if not np.isnan(v).all())
+    else:
+        ref['stem_kind'] = LAW
+        ref['w'][:] = 0.0
+        ref['cv_jump'] = NEVER
+    _choose_flow(ref, part, settings, identified, prediction, notes)
+    if ref['stem_kind'] == LAW or ref['flow_kind'] == LAW:
+        wandering = True
+    values = _residuals(clean, settings, reference, window)
+    sigma = np.full(N_RESIDUALS, np.nan)
+    if ref['stem_kind'] == LAW:
+        sigma[R1] = max(identified.sigma, 1e-4)
+    slow = _slow_flow_sigma(ref, settings, prediction, part)
+    set_limits(ref, settings, values, sigma, slow, wandering)
+    if ref['stem_kind'] == NOMINAL and prediction is not None:
+        friction_limit(ref, settings, values[:, R1], prediction.xm - prediction.xd, wandering)
+    else:
+        ref['s1'], ref['kap2'], ref['llr_limit'] = sigma[R1], 1.0, math.inf
+    return reference
+
+
+def _pieces(part: Floats, settings: ScadaSettings, period: float) -> list[Piece]:
+    return [
+        Piece(piece[:, T], piece[:, CV], piece[:, X])
+        for piece in split(part, max(settings.gap_s, 5.0 * period))
+    ]
+
+
+def _learn_inputs(ref: Any, reference: NDArray, part: Floats, settings: ScadaSettings) -> None:
+    """Learn the pressure filters and how far the pressures move by themselves."""
+    drop = part[:, PRESSURE_1] - part[:, PRESSURE_2]
+    ref['dp_mean'] = ref['drop'] = float(np.nanmean(drop))
+    share, factor = SWING
+    for i, column in enumerate((PRESSURE_1, PRESSURE_2)):
+        values = part[:, column]
+        finite = values[np.isfinite(values)]
+        learn_pressure(finite, settings.sigma, ref['pressure'][i : i + 1])
+        swing = float(np.quantile(np.abs(finite - np.median(finite)), 0.995))
+        ref['swing'][i] = max(share * abs(float(ref['drop'])), factor * swing)
+
+
+def _choose_stem(
+    ref: Any,
+    reference: NDArray,
+    clean: Floats,
+    part: Floats,
+    settings: ScadaSettings,
+    window: NDArray,
+    identified: StemFit,
+) -> Prediction:
+    """Take the stated actuator or the identified law, whichever predicts the second half better."""
+    x = part[:, X]
+    ref['stem_kind'] = NOMINAL
+    candidates = [_predict(clean, settings, reference, window, hold) for hold in (False, True)]
+    best, hold, used = min(
         (_held_out(c.phi, x - c.xm, used) / earned, hold, used)
         for hold, c in enumerate(candidates)
         for used, earned in ((BASIC_WEIGHTS, 1.0), (N_WEIGHTS, EARNED))
     )
     ref['hold'] = hold > 0
     smallest, factor = JUMPS
-    largest = float(np.abs(np.diff(samples[window, 1])).max())
+    largest = float(np.abs(np.diff(part[:, CV])).max())
     ref['cv_jump'] = NEVER if hold else max(smallest, factor * largest)
     prediction = candidates[hold]
-    ref['w'][:used], r1 = _bias(prediction.phi, x - prediction.xm, used)
-    r2 = _flow_residual(ref, prediction, samples[window, 6])
-    slow = _slow_flow_sigma(ref, settings, prediction, samples[window])
-    wandering = not all(_stationary(v) for v in samples[window, 3:6].T if not np.isnan(v).all())
-    values = (r1, r2, *prediction.innovation.T, samples[window, 5])
-    _limits(ref, settings, values, slow, wandering)
-    _friction_limit(ref, settings, r1, prediction, wandering)
-    return reference
+    ref['w'][:used], _ = _bias(prediction.phi, x - prediction.xm, used)
+    ref['x_mean'], ref['x_sd'] = prediction.xm.mean(), max(prediction.xm.std(), 1e-3)
+    half = len(x) // 2
+    of_law = loss_of(identified.error[half:])
+    as_good = best < NEARLY * of_law and math.sqrt(best) < SENSOR * settings.sigma
+    if (best > STATED * of_law and not as_good) or abs(ref['w'][1]) > STATED_FLOW[1] / 2.0:
+        ref['stem_kind'] = LAW
+        ref['w'][:] = 0.0
+        ref['cv_jump'] = NEVER
+    return prediction
 
 
 def _predict(
@@ -170,20 +207,36 @@ def _predict(
 ) -> Prediction:
     trial = reference.copy()
     trial['hold'] = hold
+    trial['x_sd'] = trial['f_sd'] = 1.0
     phi = np.empty((len(samples), N_WEIGHTS))
-    models = np.empty((len(samples), 7))
+    models = np.empty((len(samples), 6 + N_RESIDUALS))
     _predict_record(np.zeros(1, MONITOR), settings.record(), trial, samples, phi, models)
     phi, models = phi[window], models[window]
-    xm, xd, f, sq = models[:, :4].T
-    return Prediction(phi, xm, xd, f, sq, models[:, 4:6], models[:, 6] > 0)
+    xm, xd, f, sq, f_model, masked = models[:, :6].T
+    return Prediction(phi, xm, xd, f, sq, f_model, masked > 0)
+
+
+def _residuals(
+    samples: Floats, settings: ScadaSettings, reference: NDArray, window: NDArray
+) -> Floats:
+    """Return the residuals of the record as the monitor will see them, NaN where not testable."""
+    phi = np.empty((len(samples), N_WEIGHTS))
+    models = np.empty((len(samples), 6 + N_RESIDUALS))
+    _predict_record(np.zeros(1, MONITOR), settings.record(), reference, samples, phi, models)
+    return models[window][:, 6:]
 
 
 def _bias(phi: Floats, error: Floats, used: int) -> tuple[Floats, Floats]:
-    """Return ridge weights of the first `used` regressors and what they leave of the error."""
+    """Return robust ridge weights of the first `used` regressors and what they leave."""
     design = phi[:, :used]
     ridge = RIDGE * len(error) * np.eye(used)
     ridge[0, 0] = 0.0
-    w = np.asarray(np.linalg.solve(design.T @ design + ridge, design.T @ error), np.float64)
+    weight = np.ones(len(error))
+    w = np.zeros(used)
+    for _ in range(3):
+        scaled = design * weight[:, None]
+        w = np.asarray(np.linalg.solve(design.T @ scaled + ridge, scaled.T @ error), np.float64)
+        weight = np.minimum(1.0, 2.0 * huber_weights(error - design @ w))
     left: Floats = error - design @ w
     return w, left
 
@@ -191,24 +244,91 @@ def _bias(phi: Floats, error: Floats, used: int) -> tuple[Floats, Floats]:
 def _held_out(phi: Floats, error: Floats, used: int) -> float:
     half = len(error) // 2
     w, _ = _bias(phi[:half], error[:half], used)
-    return float(np.var(error[half:] - phi[half:, :used] @ w))
+    left = error[half:] - phi[half:, :used] @ w
+    return loss_of(left)
 
 
-def _flow_residual(ref: Any, prediction: Prediction, flow: Floats) -> Floats:
-    """Fit F' = g0 + g1 f and return r2, NaN where it is not measured or masked."""
-    valid = ~np.isnan(prediction.f) & ~np.isnan(flow)
-    fit = valid & ~prediction.masked
-    ref['g1'] = 1.0
-    if fit.sum() > 10:
-        weight = 1.0 / prediction.sq[fit]
-        design = np.column_stack([np.ones(fit.sum()), prediction.f[fit]]) * weight[:, None]
-        ref['g0'], ref['g1'] = np.linalg.lstsq(design, flow[fit] * weight, rcond=None)[0]
-    r2 = (flow - ref['g0'] - ref['g1'] * prediction.f) / prediction.sq
-    return np.where(valid & ~prediction.masked, r2, np.nan)
+def _choose_flow(
+    ref: Any,
+    part: Floats,
+    settings: ScadaSettings,
+    identified: StemFit,
+    prediction: Prediction | None,
+    notes: list[str] | None,
+) -> None:
+    """Take the stated flow law where it is right, else an identified one."""
+    flow = part[:, FLOW]
+    ref['flow_kind'], ref['g1'], ref['f_sd'] = NOMINAL, 1.0, 1.0
+    if not np.isfinite(flow).any():
+        return
+    ref['flow_max'] = float(np.nanquantile(flow, 0.999))
+    flow_range = settings.flow_range
+    if flow_range is None:
+        flow_range = 1.0 if ref['flow_max'] <= 1.0 else 0.0
+    stated = prediction is not None and _stated_flow(ref, prediction, flow)
+    if prediction is None:
+        return
+    pressures = (part[:, PRESSURE_1], part[:, PRESSURE_2], part[:, TEMPERATURE])
+    if not stated:
+        fit = better_medium(
+            part[:, T], part[:, X], identified.x[:, 0], pressures, flow, flow_range, settings.medium
+        )
+        if fit is None:
+            ref['flow_law']['range'] = flow_range
+            return
+        ref['flow_law'] = fit.law[0]
+        ref['flow_kind'] = LAW
+        _tell(fit, notes)
+    ref['flow_law']['range'] = flow_range
+    check_flow(ref, settings)
+
+
+def _tell(fit: FlowFit, notes: list[str] | None) -> None:
+    if notes is not None:
+        spread = 100.0 * float(fit.law['spread'][0])
+        notes.append(f'flow characteristic identified from {fit.used} samples, +-{spread:.1f} %')
+
+
+def _stated_flow(ref: Any, prediction: Prediction, flow: Floats) -> bool:
+    """
+    Fit F' = g0 + g1 f and tell whether the stated flow law is right.
+
+    f carries the noise of X', so least squares would find too small a g1; the flow at the model's
+    position does not share that noise and is the instrument.
+    """
+    fit = np.isfinite(prediction.f + prediction.f_model + flow) & ~prediction.masked
+    if fit.sum() < LEAST_SAMPLES // 2:
+        return bool(np.isfinite(prediction.f).any() and float(np.nanmax(flow)) <= 1.0)
+    f, y, sq = prediction.f[fit], flow[fit], prediction.sq[fit]
+    instrument = prediction.f_model[fit]
+    one = np.ones(len(f))
+    weight = 1.0 / sq**2
+    g = np.zeros(2)
+    left = y
+    for _ in range(4):
+        z = np.column_stack([one, instrument]) * weight[:, None]
+        g = np.linalg.lstsq(z.T @ np.column_stack([one, f]), z.T @ y, rcond=None)[0]
+        left = (y - g[0] - g[1] * f) / sq
+        weight = np.minimum(1.0, 2.0 * huber_weights(left)) / sq**2
+    ref['g0'], ref['g1'] = g
+    ref['f_mean'], ref['f_sd'] = instrument.mean(), max(instrument.std(), 1e-3)
+    sigma, gain, offset = STATED_FLOW
+    error = 3.0 * spread_of(left * sq) / (math.sqrt(len(f)) * float(ref['f_sd']))
+    off = abs(g[0] + (g[1] - 1.0) * float(ref['f_mean']))
+    right: bool = (
+        spread_of(left) <= sigma
+        and abs(g[1] - 1.0) <= gain + error
+        and off <= offset
+        and float(np.nanmax(flow)) <= 1.0 + 1e-9
+    )
+    if right and abs(g[1] - 1.0) > gain:  # the record does not tell the gain: keep the stated one
+        ref['g1'] = 1.0
+        ref['g0'] = float(np.median(y - f))
+    return right
 
 
 def _slow_flow_sigma(
-    ref: Any, settings: ScadaSettings, prediction: Prediction, samples: Floats
+    ref: Any, settings: ScadaSettings, prediction: Prediction | None, part: Floats
 ) -> float:
     """
     Return the sigma of r2 that a sum over many samples shows, by theory.
@@ -216,7 +336,9 @@ def _slow_flow_sigma(
     The pressure filter cuts the variance of the noise to the share c, but has a gain of 1 for
     what is slow: there the variance is that of the sensors.
     """
-    drop = np.maximum(samples[:, 3] - samples[:, 4], 0.02)
+    if prediction is None or ref['flow_kind'] == LAW:
+        return 1.0
+    drop = np.maximum(part[:, PRESSURE_1] - part[:, PRESSURE_2], 0.02)
     share = (settings.sigma * prediction.f / (2.0 * drop) / prediction.sq) ** 2
     fit = ~np.isnan(share) & ~prediction.masked
     if not fit.any():
@@ -225,59 +347,11 @@ def _slow_flow_sigma(
     return math.sqrt(1.0 + passed * float(share[fit].mean()))
 
 
-def _limits(
-    ref: Any, settings: ScadaSettings, values: tuple[Floats, ...], slow: float, wandering: bool
-) -> None:
-    """Set mu, sigma, allowance and limit of every CUSUM from the budget."""
-    n = len(values[R1])
-    arl = arl_per_test(settings)
-    for i, test in enumerate(TESTS):
-        r = values[test.residual]
-        r = r[~np.isnan(r)]
-        margin = test.wandering if wandering else test.margin
-        if r.size < 200 or not margin > 0.0:
-            continue
-        sd = block_sigma(r, 1)
-        if test.residual == R2 and test.block == SLOW:
-            sd *= slow
-        sd = max(sd, block_sigma(r, test.block))
-        if not sd > 0.0:  # an input without any noise: nothing to test
-            continue
-        mu = r.mean()
-        if test.k0 == 4.0:
-            quantile = NormalDist().inv_cdf(1.0 - 0.25 / n)
-            sd *= max(1.0, float(np.abs(r - mu).max()) / sd / quantile)
-        k = test.k0 + STANDARD_ERRORS[test.block] / math.sqrt(r.size)
-        clip = test.clip
-        if (wandering or n < LONG_RECORD) and test.residual == R1 and test.k0 == 4.0:
-            clip = JUMP_CLIP
-        largest = cusum_maximum((r - mu) / sd, k, clip)
-        ref['mu'][i], ref['sd'][i], ref['k'][i], ref['clip'][i] = mu, sd, k, clip
-        ref['h'][i] = max(margin * siegmund_limit(k, arl), HEAD_ROOM * largest)
-
-
-def _stationary(values: Floats) -> bool:
+def stationary(values: Floats) -> bool:
     """Tell whether an input has no slow component, so that its mean can be tested."""
-    sigma = block_sigma(values, 1)
-    blocks = values.size // 30
-    return bool(block_sigma(values, 30) <= sigma * (STATIONARY + 1.0 / math.sqrt(blocks)))
+    from damadics_fd.core.scada.limits import is_stationary
+
+    return is_stationary(values[np.isfinite(values)])
 
 
-def arl_per_test(settings: ScadaSettings) -> float:
-    """Return the mean samples between false alarms each one-sided test may have."""
-    tests = 2 * len(TESTS) + 1
-    return settings.days_per_false_alarm * DAY_S / settings.period_s * tests
-
-
-def _friction_limit(
-    ref: Any, settings: ScadaSettings, r1: Floats, prediction: Prediction, wandering: bool
-) -> None:
-    s1 = float(r1.std())
-    kap2 = max(1.0, (block_sigma(r1, 5) / s1) ** 2)
-    wide = (r1 + prediction.xm - prediction.xd) / s1
-    gain = ((r1 / s1) ** 2 - wide**2) / (2.0 * kap2)
-    ref['s1'], ref['kap2'] = s1, kap2
-    ref['llr_limit'] = max(
-        LLR_MARGINS[wandering] * math.log(arl_per_test(settings)),
-        LLR_HEAD_ROOM * _llr_maximum(gain),
-    )
+_ = (R2, T1)

@@ -30,6 +30,7 @@ TRACE = np.dtype(
         ('alarm', np.bool_),
     ]
 )
+FARTHEST = 10.0  # times 4 MPa: no control valve works above
 OUTSIDE = 0.25  # share of full scale a measurement may lie outside its range
 LEARN_AGAIN_S = 60.0
 
@@ -84,7 +85,13 @@ def usable(sample: np.ndarray, s: Any) -> Any:
     """Tell whether a sample may enter: in time order, finite, near its ranges."""
     if not math.isfinite(sample[0]) or (s.samples > 0 and sample[0] <= s.t_raw):
         return False
-    return sample[1:5].min() >= -OUTSIDE and sample[1:5].max() <= 1.0 + OUTSIDE  # NaN: false
+    for i in range(1, 3):
+        if not -OUTSIDE <= sample[i] <= 1.0 + OUTSIDE:  # NaN: refused
+            return False
+    for i in range(3, 5):
+        if not math.isnan(sample[i]) and not -OUTSIDE <= sample[i] <= FARTHEST:
+            return False
+    return not math.isinf(sample[5]) and not math.isinf(sample[6])
 
 
 @jit
@@ -149,7 +156,7 @@ def _replay(
     for i in range(samples.shape[0]):
         r = samples[i]
         predict(s, settings[0], reference[0], r[0], r[1], r[2], r[3], r[4], r[5], r[6])
-        residuals(s, reference[0], r[2], r[5], r[6])
+        residuals(s, reference[0], r[2], r[3], r[4], r[5], r[6])
         s.t_raw = r[0]
 
 
@@ -178,6 +185,7 @@ class ScadaMonitor:
         """Forget every sample, and the reference unless it was given."""
         self.reference = self._given
         self.learning_problem = ''
+        self.notes: list[str] = []
         self._state = np.zeros(1, MONITOR)
         self._buffer = np.empty((0, 7))
         self._filled = 0
@@ -334,7 +342,7 @@ class ScadaMonitor:
         """Learn from the buffer, then bring the models to the present through it."""
         record = self._buffer[: self._filled]
         try:
-            reference = learn(record, self.settings)
+            reference = learn(record, self.settings, self._learn_until, self.notes)
         except LearningError as problem:
             self.learning_problem = str(problem)
             self._learn_until += LEARN_AGAIN_S

@@ -26,6 +26,9 @@ class ScadaSettings:
         such as the fault-free record does not show: when within the period it came is not known.
     :param saturated: no flow test while the model's flow is above the second of these limits and
         both F' and f are above the first: the flow meter shows no more than its range.
+    :param flow_range: end of the flow meter's range, share of 40 t/h; None: learned.
+    :param medium: 0 liquid, 1 gas or steam; None: whichever the record fits better.
+    :param kv_stated: the actuator's valve coefficient is that of this valve, not a default.
     :param actuator: nominal parameters.
     """
 
@@ -39,6 +42,9 @@ class ScadaSettings:
     gap_s: float = 30.0
     settle_s: float = 120.0
     saturated: tuple[float, float] = (0.94, 0.97)
+    flow_range: float | None = None
+    medium: int | None = None
+    kv_stated: bool = False
     actuator: Valve = field(default_factory=Valve)
 
     def __post_init__(self) -> None:

@@ -1,0 +1,49 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Prepare a record for learning: single wrong samples, gaps, period."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from damadics_fd.core.scada.robust import Floats, spread_of
+
+ISOLATED = 8.0  # sigma of the change from sample to sample
+MEASURED = (2, 3, 4, 5, 6)  # columns that a transmitter sends; CV is what was commanded
+
+
+def despiked(samples: Floats) -> Floats:
+    """
+    Return the record with every single-sample spike replaced by its neighbours' mean.
+
+    :param samples: rows t, CV, X', P1', P2', T1', F'.
+    """
+    out = samples.copy()
+    if len(samples) < 5:
+        return out
+    for column in MEASURED:
+        v = samples[:, column]
+        if not np.isfinite(v).any():
+            continue
+        middle = 0.5 * (v[:-2] + v[2:])
+        off = v[1:-1] - middle
+        steady = np.abs(v[2:] - v[:-2])
+        sigma = spread_of(off)
+        if not sigma > 0.0:
+            continue
+        bad = (np.abs(off) > ISOLATED * sigma) & (steady < 0.5 * np.abs(off))
+        out[1:-1, column] = np.where(bad, middle, v[1:-1])
+    return out
+
+
+def period_of(t: Floats) -> float:
+    """Return the usual time between samples, s."""
+    return float(np.median(np.diff(t))) if len(t) > 1 else 1.0
+
+
+def split(samples: Floats, gap: float) -> Iterator[Floats]:
+    """Yield the parts of a record between gaps, s, that are worth learning from."""
+    cuts = np.flatnonzero(np.diff(samples[:, 0]) > gap) + 1
+    for part in np.split(samples, cuts):
+        if len(part) >= 20:
+            yield part

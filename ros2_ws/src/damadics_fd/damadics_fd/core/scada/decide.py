@@ -1,0 +1,198 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Feed the tests and keep what stands: one occurrence for as long as a fault is there."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from damadics_fd.core.jit import jit
+from damadics_fd.core.scada.cusum import FRICTION_TEST, R1, R2, TESTS
+from damadics_fd.core.scada.state import LAW, N_RESIDUALS, N_TESTS
+
+LLR_CLIP = 8.0
+TEST_RESIDUAL = np.array([test.residual for test in TESTS])
+JUMP_TEST = np.array([test.k0 == 4.0 for test in TESTS])
+# Multiples of its limit beyond which a statistic does not grow, so that it comes back in time
+# after the fault: quick tests, slow ones.
+CAPS = (3.0, 1.2)
+ONE_SAMPLE = 0.8  # of a limit, the most that a single sample brings
+JUMP = 6.0  # sigma from one sample to the next that may be a spike
+BACK = 4.0  # sigma within which it has come back
+RECOVERY = 60  # testable samples in a row without evidence after which a fault has gone
+# A fault that shows now and then, as when the stem turns, must stay away longer every time.
+AGAIN_S = 600.0
+LONGEST_RECOVERY = 3600
+RECOVERY_TRAVEL = 0.05  # of the stroke, that the stem moves meanwhile where r1 showed the fault
+
+
+@jit
+def silence(s: Any) -> None:
+    """Forget the evidence so far: no test yet."""
+    s.g[:] = 0.0
+    s.saved[:] = 0.0
+    s.zero[:] = s.t
+    s.llr = 0.0
+    s.llr_zero = s.t
+    s.ratios[:] = 0.0
+    s.good[:] = 0
+    s.jumped[:] = 0
+
+
+@jit
+def reject_spikes(s: Any, ref: Any) -> None:
+    """Take back what a single sample brought that has come back at the next one."""
+    for r in range(N_RESIDUALS):
+        value = s.residual[r]
+        far = False
+        for i in range(N_TESTS):
+            if TEST_RESIDUAL[i] != r or not ref.sd[i] > 0.0 or math.isnan(value):
+                continue
+            z = abs(value - ref.mu[i]) / ref.sd[i]
+            if s.jumped[r] > 0:
+                if z < BACK:
+                    for j in range(N_TESTS):
+                        if TEST_RESIDUAL[j] == r:
+                            s.g[j, 0] = s.saved[j, 0]
+                            s.g[j, 1] = s.saved[j, 1]
+                    s.spikes[r] += 1
+            elif z > JUMP:
+                far = s.g[i, 0] < ref.h[i] and s.g[i, 1] < ref.h[i]
+                for j in range(N_TESTS):
+                    if TEST_RESIDUAL[j] == r:
+                        s.saved[j, 0] = s.g[j, 0]
+                        s.saved[j, 1] = s.g[j, 1]
+            break  # the first test of a residual judges the jump
+        s.jumped[r] = 1 if far else 0
+
+
+@jit
+def decide(s: Any, ref: Any) -> None:
+    """Feed every test; the first statistic to reach its limit raises the alarm."""
+    s.ratio = 0.0
+    if s.t < s.t_test:
+        silence(s)
+        s.ratio = 1.0 if s.stood else 0.0
+        return
+    reject_spikes(s, ref)
+    onset = s.t
+    top = 0.0
+    for i in range(N_TESTS):
+        r = TEST_RESIDUAL[i]
+        value = s.residual[r]
+        if math.isnan(value):
+            s.testable[r] = 0
+        if math.isnan(value) or not ref.sd[i] > 0.0:
+            continue
+        s.beyond[i] = 0
+        if s.testable[r] > 0:
+            z = (value - ref.mu[i]) / ref.sd[i]
+            z = min(max(z, -ref.clip[i]), ref.clip[i])
+            k = ref.k[i]
+            if r <= R2:
+                k += ref.se[i] * (s.lever[r] - 1.0)
+            s.beyond[i] = 1 if abs(z) > k else 0
+            z = min(max(z, -k - ONE_SAMPLE * ref.h[i]), k + ONE_SAMPLE * ref.h[i])
+            for side in range(2):
+                g = s.g[i, side] + (z if side == 0 else -z) - k
+                if g <= 0.0:
+                    g = 0.0
+                    s.zero[i, side] = s.t
+                s.g[i, side] = min(g, CAPS[0 if ref.k[i] > 1.0 else 1] * ref.h[i])
+        side = 0 if s.g[i, 0] >= s.g[i, 1] else 1
+        s.ratios[i] = s.g[i, side] / ref.h[i]
+        if s.ratios[i] > top:
+            top = s.ratios[i]
+            s.worst = i
+            onset = s.zero[i, side]
+    if ref.stem_kind != LAW:
+        test_friction(s, ref)
+        if s.ratios[FRICTION_TEST] > top:
+            top = s.ratios[FRICTION_TEST]
+            s.worst = FRICTION_TEST
+            onset = s.llr_zero
+    for i in range(N_TESTS + 1):
+        s.peaks[i] = max(s.peaks[i], s.ratios[i])
+    s.ratio = top
+    stands = keep_standing(s)
+    if not stands:
+        return
+    if s.ratio < 1.0:
+        s.ratio = 1.0
+    if not s.stood:
+        s.occurrence += 1
+        again = s.occurrence > 1 and s.t - s.t_gone < AGAIN_S
+        s.recovery = min(2 * s.recovery, LONGEST_RECOVERY) if again else RECOVERY
+        s.t_raised = s.t
+        s.t_onset = onset
+        s.t_shown[:] = math.nan
+        s.sign[:] = 0.0
+        s.test = s.worst
+    s.stood = True
+    note_evidence(s)
+    if not s.alarm:
+        s.alarm = True
+        s.t_alarm = s.t
+
+
+@jit
+def note_evidence(s: Any) -> None:
+    """Note which residuals show the present fault, since when and which way."""
+    for i in range(N_TESTS):
+        r = TEST_RESIDUAL[i]
+        if s.ratios[i] >= 1.0 and math.isnan(s.t_shown[r]):
+            s.t_shown[r] = s.t
+            s.sign[r] = 1.0 if s.g[i, 0] >= s.g[i, 1] else -1.0
+
+
+@jit
+def test_friction(s: Any, ref: Any) -> None:
+    """Compare the model with a copy of three times the play by their likelihoods."""
+    if s.testable[R1] > 0:
+        z1 = s.residual[R1] / ref.s1
+        z1d = (s.residual[R1] + s.xm[0] - s.xd) / ref.s1
+        gain = (z1 * z1 - z1d * z1d) / (2.0 * ref.kap2)
+        s.llr += min(max(gain, -LLR_CLIP), LLR_CLIP)
+        s.llr = min(s.llr, CAPS[0] * ref.llr_limit)
+        if s.llr <= 0.0:
+            s.llr = 0.0
+            s.llr_zero = s.t
+    s.ratios[FRICTION_TEST] = s.llr / ref.llr_limit
+
+
+@jit
+def keep_standing(s: Any) -> bool:
+    """
+    Tell whether a fault stands; what cannot be tested now is not good.
+
+    A residual that showed a fault must be testable, without evidence, for as many samples as
+    RECOVERY, and a stem must have moved meanwhile.
+    """
+    s.travel += abs(s.xm[0] - s.xm[1])
+    any_stands = False
+    if not s.stood and s.ratio < 0.2:
+        s.level_before[0] = s.level[0]
+        s.level_before[1] = s.level[1]
+    for r in range(N_RESIDUALS):
+        bad = False
+        for i in range(N_TESTS + 1):
+            of = R1 if i == FRICTION_TEST else TEST_RESIDUAL[i]
+            if of == r and s.ratios[i] >= 1.0:
+                bad = True
+                if i == FRICTION_TEST or s.beyond[i] > 0:
+                    s.t_evidence = s.t
+        if bad:
+            s.stands[r] = 1
+            s.good[r] = 0
+            if r == R1:
+                s.travel = 0.0
+        elif s.testable[r] > 0:
+            s.good[r] += 1
+        if s.stands[r] > 0 and s.good[r] >= max(s.recovery, RECOVERY) and (r != R1 or s.travel >= RECOVERY_TRAVEL):
+            s.stands[r] = 0
+        any_stands = any_stands or s.stands[r] > 0
+    if s.stood and not any_stands:
+        s.stood = False
+        s.t_gone = s.t
+    return any_stands

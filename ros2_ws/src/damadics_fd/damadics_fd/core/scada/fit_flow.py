@@ -1,0 +1,213 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Identify the flow law from fault-free records.
+
+X' carries noise of its own, which would flatten the characteristic (regression dilution). The
+position that follows from CV alone does not share that noise: it is the instrument. Away from the
+record, a random walk of the slope about what control valves have (a rangeability of 50 is a slope
+of -4) says how far the characteristic may be from its extension.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from damadics_fd.core.scada.flow_law import FLOW_LAW, GAS, KNOTS, LIQUID, STEP, sizing
+from damadics_fd.core.scada.robust import Floats, effective, huber_weights, spread_of
+
+SLOPE, SLOPE_SPREAD = -4.0, 2.0
+LAST_SLOPE, LAST_SPREAD = -8.0, 6.0  # between the last two knots the port closes
+TURN = 1.5  # change of the slope from knot to knot
+EXPONENT = (0.05, 0.3)  # standard deviation of the exponent's error: best and worst known
+LAGS = (0.0, 0.7, 1.5, 3.0, 5.0)
+LEAST_FLOW = 0.02  # of the meter's range; below it meters do not measure
+BETTER = 0.9
+AVERAGED = 5  # samples
+
+
+@dataclass(frozen=True)
+class FlowFit:
+    """
+    A flow law and what it leaves.
+
+    :param law: structured array of `FLOW_LAW`, length 1.
+    :param left: log F' - law, NaN where not fitted.
+    :param used: samples fitted.
+    """
+
+    law: NDArray
+    left: Floats
+    used: int
+
+
+def hats(x: Floats) -> Floats:
+    """Return the weights of the knots at positions x, shape (n, KNOTS)."""
+    place = np.clip(x, 0.0, 1.0) / STEP
+    i = np.minimum(place.astype(int), KNOTS - 2)
+    basis = np.zeros((len(x), KNOTS))
+    rows = np.arange(len(x))
+    basis[rows, i] = 1.0 - (place - i)
+    basis[rows, i + 1] = place - i
+    return basis
+
+
+def smooth(values: Floats, t: Floats, lag: float) -> Floats:
+    """Return values after a first-order lag; NaN hold the value before."""
+    if lag <= 0.0:
+        return values
+    out = np.empty_like(values)
+    last = values[np.isfinite(values)][0] if np.isfinite(values).any() else math.nan
+    shares = 1.0 - np.exp(-np.diff(t, prepend=t[0]) / lag)
+    for i, (value, share) in enumerate(zip(values.tolist(), shares.tolist(), strict=True)):
+        if math.isfinite(value):
+            last += share * (value - last)
+        out[i] = last
+    return out
+
+
+def prior() -> tuple[Floats, Floats]:
+    """Return precision matrix and right-hand side of what is expected of a characteristic."""
+    rows, values = [], []
+    for j in range(KNOTS - 1):
+        last = j == KNOTS - 2
+        # towards the seat every characteristic turns to zero: log F gets steep there
+        steeper = max(1.0, 0.5 / (1.0 - (j + 0.5) * STEP))
+        spread = (LAST_SPREAD if last else SLOPE_SPREAD * steeper) * STEP
+        row = np.zeros(KNOTS)
+        row[j], row[j + 1] = -1.0 / spread, 1.0 / spread
+        rows.append(row)
+        values.append((LAST_SLOPE if last else SLOPE) * STEP / spread)
+        if j < KNOTS - 3:
+            row = np.zeros(KNOTS)
+            row[j : j + 3] = np.array([1.0, -2.0, 1.0]) / (TURN * steeper * STEP)
+            rows.append(row)
+            values.append(0.0)
+    a, b = np.array(rows), np.array(values)
+    return a.T @ a + 1e-9 * np.eye(KNOTS), a.T @ b
+
+
+def sizes(medium: int, p1: Floats, p2: Floats, t1: Floats) -> Floats:
+    """Return the sizing term of every sample."""
+    return np.array([sizing(medium, *row) for row in zip(p1, p2, t1, strict=True)])
+
+
+def fit_flow(
+    t: Floats,
+    x: Floats,
+    model_x: Floats,
+    size: Floats,
+    flow: Floats,
+    flow_range: float,
+    medium: int = LIQUID,
+) -> FlowFit | None:
+    """
+    Identify the law.
+
+    :param t: time, s; the others are aligned with it.
+    :param x: measured position, 0..1; model_x the stem law's.
+    :param size: sizing term of `sizes`.
+    :param flow: measured flow, scaled.
+    :param flow_range: end of the meter's range, scaled; 0 where it is not known.
+    :param medium: LIQUID or GAS.
+    :return: the law; None where too little flow or pressure drop was measured.
+    """
+    scale = flow_range or float(np.nanquantile(flow, 0.999)) if np.isfinite(flow).any() else 0.0
+    if not scale > 0.0:
+        return None
+    high = 0.985 * flow_range if flow_range else math.inf
+    good = np.isfinite(flow + size) & (flow > LEAST_FLOW * scale) & (flow < high)
+    good &= x < 1.0 - 0.5 * STEP
+    if good.sum() < 100:
+        return None
+    best = None
+    for lag in LAGS:
+        fit = _fit(t, x, model_x, size, flow, good, lag)
+        if best is None or fit[0] < BETTER * best[0]:
+            best = (*fit, lag)
+    _, c, v, left, spread, lag = best
+    law = np.zeros(1, FLOW_LAW)
+    law['medium'], law['c'], law['lag_s'], law['range'] = medium, c, lag, flow_range
+    law['size0'] = float(np.mean(size[good]))
+    law['noise'] = 0.002 * scale
+    law['spread'] = max(spread, 1e-3)
+    law['v'][0, :KNOTS, :KNOTS] = v
+    law['v'][0, KNOTS, KNOTS] = _exponent_doubt(left, size - law['size0'][0]) ** 2
+    return FlowFit(law, left, int(good.sum()))
+
+
+def _fit(
+    t: Floats, x: Floats, model_x: Floats, size: Floats, flow: Floats, good: NDArray, lag: float
+) -> tuple[float, Floats, Floats, Floats, float]:
+    """Return robust spread, knots, their covariance and the residual for one lag of the meter."""
+    a = hats(smooth(x, t, lag))[good]
+    z = hats(smooth(model_x, t, lag))[good]
+    y = np.log(flow[good]) - smooth(np.where(np.isfinite(size), size, np.nan), t, lag)[good]
+    precision, pull = prior()
+    weight = np.ones(len(y))
+    spread = 0.05
+    c = np.zeros(KNOTS)
+    left = y
+    for _ in range(8):
+        normal = z.T @ (a * weight[:, None])
+        c = np.linalg.solve(normal + precision * spread**2, z.T @ (weight * y) + pull * spread**2)
+        left = y - a @ c
+        left = left - np.median(left)
+        spread = max(spread_of(left), 1e-4)
+        weight = huber_weights(left)
+    share = effective(left) / len(left)
+    normal = a.T @ (a * weight[:, None])
+    v = np.linalg.inv(normal * share / spread**2 + precision)
+    c = np.minimum.accumulate(c)
+    full = np.full(len(x), np.nan)
+    full[good] = y - a @ c
+    c = c + np.nanmedian(full)
+    full -= np.nanmedian(full)
+    # a lag also averages noise, which must not count for it: compare what is slower
+    slow = np.convolve(full[good], np.ones(AVERAGED) / AVERAGED, 'valid')
+    return spread_of(slow), c, v, full, spread
+
+
+def _exponent_doubt(left: Floats, size: Floats) -> float:
+    """Return how far the exponent of the pressure term may be off, by what slow changes leave."""
+    length = max(len(left) // 200, 10)
+    n = len(left) // length
+    ok = np.isfinite(left[: n * length] + size[: n * length]).reshape(n, length)
+    counts = ok.sum(axis=1)
+    rows = counts > length // 2
+    if rows.sum() < 8:
+        return EXPONENT[1]
+    r = np.where(ok, left[: n * length].reshape(n, length), 0.0).sum(axis=1)[rows] / counts[rows]
+    s = np.where(ok, size[: n * length].reshape(n, length), 0.0).sum(axis=1)[rows] / counts[rows]
+    s = s - s.mean()
+    total = float(s @ s)
+    if not total > 0.0:
+        return EXPONENT[1]
+    slope = float(s @ r) / total
+    error = spread_of(r - slope * s) / math.sqrt(total)
+    return min(max(abs(slope) + 2.0 * error, EXPONENT[0]), EXPONENT[1])
+
+
+def better_medium(
+    t: Floats,
+    x: Floats,
+    model_x: Floats,
+    pressures: tuple[Floats, Floats, Floats],
+    flow: Floats,
+    flow_range: float,
+    stated: int | None,
+) -> FlowFit | None:
+    """Return the law of the stated medium; of the one that leaves least where none is stated."""
+    media = (LIQUID, GAS) if stated is None else (stated,)
+    fits = [
+        fit_flow(t, x, model_x, sizes(medium, *pressures), flow, flow_range, medium)
+        for medium in media
+    ]
+    found = [fit for fit in fits if fit is not None]
+    if not found:
+        return None
+    first = found[0]
+    second = found[-1]
+    return second if second.law['spread'][0] < 0.8 * first.law['spread'][0] else first

@@ -1,0 +1,191 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Identify the stem law from fault-free records: lag, dead time, rates, dead band, gain, offset."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from damadics_fd.core.scada.robust import Floats, effective, huber_weights, loss_of, spread_of
+from damadics_fd.core.scada.stem_law import (
+    FAST,
+    STEM_LAW,
+    STEM_TRACK,
+    TRANSIENT,
+    follow_record,
+)
+
+GAIN_SPREAD = 0.03  # a positioner moves the stem by what CV asks, within this
+OFFSET_SPREAD = 0.05
+SLOWEST = 1.0 / 120.0  # stroke/s: a positioner that passes no more air than this is rare
+TRANSIENT_ROOM = 1.2
+LARGE = 10.0  # sigma
+LIMITED = 0.7  # of a rate limit that was found: seen to hold
+BETTER = 0.98  # a further parameter must cut the error to this share
+LAGS = (0.0, 0.3, 0.6, 1.0, 1.5, 2.0, 3.0, 5.0, 8.0, 12.0, 20.0, 35.0)
+DEADS = (0.0, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 9.0)
+RATES = (FAST, 0.5, 0.25, 0.15, 0.1, 0.07, 0.05, 0.035, 0.025, 0.017, 0.012)
+BANDS = (0.0, 0.003, 0.006, 0.01, 0.015, 0.025, 0.04, 0.06)
+
+
+@dataclass(frozen=True)
+class Piece:
+    """Part of a record without a gap: t (s), CV and X (0..1)."""
+
+    t: Floats
+    cv: Floats
+    x: Floats
+
+
+@dataclass(frozen=True)
+class StemFit:
+    """
+    A stem law and what it leaves.
+
+    :param law: structured array of `STEM_LAW`, length 1.
+    :param x: position of the law, its slow copy; shape (n, 2), all pieces in a row.
+    :param error: X' - law.
+    :param sigma: robust standard deviation of the error.
+    :param gain: gain that the record alone shows, without what is expected of a positioner.
+    :param gain_error: its standard error; infinite where CV hardly moves.
+    """
+
+    law: NDArray
+    x: Floats
+    error: Floats
+    sigma: float
+    gain: float
+    gain_error: float
+
+
+def run_law(law: NDArray, pieces: Sequence[Piece]) -> Floats:
+    """Return law and slow copy over all pieces with gain 1 and offset 0 and the way to go, (n, 3)."""
+    track = np.zeros(1, STEM_TRACK)
+    out = []
+    for piece in pieces:
+        part = np.empty((len(piece.t), 3))
+        follow_record(law, track, piece.t, piece.cv, part)
+        out.append(part)
+    return np.concatenate(out)
+
+
+def fit_stem(pieces: Sequence[Piece], period: float) -> StemFit:
+    """
+    Identify the law.
+
+    :param pieces: fault-free.
+    :param period: sample period, s.
+    :return: the law that leaves least.
+    """
+    law = np.zeros(1, STEM_LAW)
+    law['rise'] = law['fall'] = law['slow_rise'] = law['slow_fall'] = FAST
+    law['gain'] = 1.0
+    law['lag_s'] = min(max(period, 0.5), 5.0)
+    x = np.concatenate([piece.x for piece in pieces])
+    unit = max(1.0, period)
+    grids = {
+        'lag_s': [v * unit for v in LAGS],
+        'dead_s': [v * unit for v in DEADS],
+        'rise': [v for v in RATES if v * period < 4.0],
+        'fall': [v for v in RATES if v * period < 4.0],
+        'band': list(BANDS),
+    }
+    best = _loss(law, pieces, x)
+    for turn in range(3):
+        before = best
+        for name, grid in grids.items():
+            best = _search(law, name, grid, best, pieces, x)
+        if turn and best > 0.999 * before:
+            break
+    for name in ('lag_s', 'dead_s', 'rise', 'fall', 'band'):
+        value = float(law[name][0])
+        if 0.0 < value < FAST:
+            best = _search(law, name, [value * f for f in (0.75, 0.87, 1.15, 1.3)], best, pieces, x)
+    _proven(law, pieces)
+    return _finish(law, pieces, x)
+
+
+def _loss(law: NDArray, pieces: Sequence[Piece], x: Floats) -> float:
+    """Return a robust variance of what the law leaves, with gain 1 and a free offset."""
+    e = x - run_law(law, pieces)[:, 0]
+    e -= np.median(e)
+    return loss_of(e)
+
+
+def _search(
+    law: NDArray,
+    name: str,
+    grid: Sequence[float],
+    best: float,
+    pieces: Sequence[Piece],
+    x: Floats,
+) -> float:
+    kept = float(law[name][0])
+    for value in grid:
+        if value == kept:
+            continue
+        law[name] = value
+        found = _loss(law, pieces, x)
+        if found < BETTER * best:
+            best, kept = found, value
+    law[name] = kept
+    return best
+
+
+def _proven(law: NDArray, pieces: Sequence[Piece]) -> None:
+    """Set the rates of the slow copy: what the law was seen to do, in each direction."""
+    track = run_law(law, pieces)[:, 0]
+    t = np.concatenate([piece.t for piece in pieces])
+    dt = np.diff(t)
+    ok = (dt > 0.0) & (dt < 5.0 * np.median(dt))
+    rate = np.diff(track)[ok] / dt[ok]
+    for name, sign in (('rise', 1.0), ('fall', -1.0)):
+        moved = np.sort(np.maximum(sign * rate, 0.0))
+        seen = float(moved[-max(3, len(moved) // 1000)]) if len(moved) > 10 else 0.0
+        limit = float(law[name][0])
+        slow = LIMITED * limit if limit < FAST and seen > 0.5 * limit else min(seen, limit)
+        law[f'slow_{name}'] = max(min(slow, limit), min(SLOWEST, limit))
+
+
+def _transient(left: Floats, ahead: Floats, sigma: float) -> float:
+    """Return which share of the way still to go the law is wrong by, at the most, in large moves."""
+    large = ahead > LARGE * sigma
+    if large.sum() < 10:
+        return TRANSIENT
+    share = (np.abs(left[large]) - 3.0 * sigma) / ahead[large]
+    return max(TRANSIENT, TRANSIENT_ROOM * float(np.quantile(share, 0.995)))
+
+
+def _finish(law: NDArray, pieces: Sequence[Piece], x: Floats) -> StemFit:
+    track = run_law(law, pieces)
+    u = track[:, 0]
+    centre = float(np.mean(u))
+    design = np.column_stack([np.ones(len(u)), u - centre])
+    target = x - u
+    weight = np.ones(len(u))
+    free = np.zeros(2)
+    for _ in range(10):
+        normal = design.T @ (design * weight[:, None])
+        free = np.linalg.lstsq(normal, design.T @ (weight * target), rcond=None)[0]
+        left = target - design @ free
+        weight = huber_weights(left)
+    sigma = max(spread_of(left), 1e-5)
+    n = effective(left)
+    share = n / len(u)
+    variance = sigma**2 / share
+    sums = design.T @ (design * weight[:, None])
+    error = math.sqrt(variance / sums[1, 1]) if sums[1, 1] > 0.0 else math.inf
+    prior = np.diag([1.0 / OFFSET_SPREAD**2, 1.0 / GAIN_SPREAD**2]) * variance
+    theta = np.linalg.solve(sums + prior, design.T @ (weight * target))
+    covariance = np.linalg.inv(sums + prior) * variance
+    law['gain'] = 1.0 + theta[1]
+    law['offset'] = theta[0] - theta[1] * centre
+    law['centre'] = float(law['offset'][0]) + float(law['gain'][0]) * centre
+    law['v_offset'], law['v_gain'] = covariance[0, 0], covariance[1, 1]
+    position = np.clip(law['offset'] + law['gain'] * track[:, :2], 0.0, 1.0)
+    left = x - position[:, 0]
+    law['transient'] = _transient(left, track[:, 2], sigma)
+    return StemFit(law, position, left, spread_of(left), 1.0 + float(free[1]), error)

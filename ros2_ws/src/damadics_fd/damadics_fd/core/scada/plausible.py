@@ -1,0 +1,67 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Refuse to learn what cannot be a valve that works."""
+
+from typing import Any
+
+import numpy as np
+
+from damadics_fd.core.scada.fit_stem import StemFit
+from damadics_fd.core.scada.robust import Floats
+from damadics_fd.core.scada.settings import ScadaSettings
+from damadics_fd.core.scada.state import LAW
+
+UNKNOWN_GAIN = 0.2  # standard error of the stem's gain above which the record shows no motion
+GAIN = 0.1  # a positioner's gain may differ from 1 by this
+OFFSET = 0.1
+SIGMAS = 4.0
+FLOW_GAIN = 0.1
+
+
+class LearningError(ValueError):
+    """The record cannot serve as a reference; the message names cause and remedy."""
+
+
+def check_stem(fit: StemFit, cv: Floats, x: Floats) -> None:
+    """
+    Refuse a stem that does not follow its command.
+
+    :param fit: what was identified.
+    :param cv: command; x position.
+    :raises LearningError: saying what does not fit.
+    """
+    asked = float(np.quantile(cv, 0.99) - np.quantile(cv, 0.01))
+    if not fit.gain_error <= UNKNOWN_GAIN:
+        raise LearningError(
+            f'CV travelled over {asked:.3f} of the stroke only, too little to see that the stem '
+            'follows it: learn while the valve works'
+        )
+    slack = max(GAIN, SIGMAS * fit.gain_error)
+    if abs(fit.gain - 1.0) > slack:
+        raise LearningError(
+            f'this does not look like a valve that works: the stem moves by {fit.gain:.2f} of what '
+            'CV asks (1 expected): stuck, bent feedback or a wrong scale; mend it or check the units'
+        )
+    offset = float(np.median(fit.error + fit.x[:, 0] - fit.x[:, 0]))
+    mean = float(np.median(x - cv))
+    if abs(mean) > OFFSET and abs(offset) + abs(mean) > OFFSET:
+        raise LearningError(
+            f'this does not look like a valve that works: the stem stands {mean:+.2f} of the stroke '
+            'off its command; mend it or check the scale of X'
+        )
+
+
+def check_flow(ref: Any, settings: ScadaSettings) -> None:
+    """
+    Refuse a flow that the stated valve coefficient cannot give.
+
+    :param ref: record of `REFERENCE` with its flow law.
+    :param settings: whether the coefficient was stated.
+    :raises LearningError: saying what was found.
+    """
+    if settings.kv_stated and ref['flow_kind'] == LAW and abs(float(ref['g1']) - 1.0) > FLOW_GAIN:
+        raise LearningError(
+            f'this does not look like the valve described: the flow is {float(ref["g1"]):.2f} of '
+            f'that of the stated Kv {settings.actuator.kv:g}; mend valve or meter, or state what '
+            'the valve is'
+        )

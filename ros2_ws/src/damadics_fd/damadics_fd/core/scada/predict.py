@@ -1,0 +1,275 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Bring pressure filter, stem models and flow law to the time of a sample."""
+
+import math
+from typing import Any
+
+from damadics_fd.core.jit import jit
+from damadics_fd.core.scada.actuator import nominal_flow
+from damadics_fd.core.scada.flow_law import characteristic, sizing
+from damadics_fd.core.scada.model import advance_stem, copy_stem, start_stem
+from damadics_fd.core.scada.pressure import (
+    GATE,
+    TAPS,
+    fuse_pressure,
+    innovation,
+    predict_pressure,
+    push,
+)
+from damadics_fd.core.scada.state import HISTORY_LENGTH, LAW
+from damadics_fd.core.scada.stem_law import advance_track, position, start_track
+
+SETTLING_PERIODS = 10.0
+COPIES = 2  # rows in a row that may be copies
+GAP_PERIODS = 5.0  # sample periods without a sample that are no gap yet
+
+
+@jit
+def restart(
+    s: Any, cfg: Any, ref: Any, t: float, cv: float, x: float, p1: float, p2: float
+) -> None:
+    """Start the models and the pressure filter at this sample."""
+    start_track(s.track, t, cv)
+    if ref.stem_kind == LAW:
+        s.track.lagged[:] = (x - ref.stem_law.offset) / ref.stem_law.gain
+        s.track.held[:] = s.track.lagged[0]
+    s.f_lagged = math.nan
+    s.flat = 0
+    start_stem(s.stem[0], cfg.act, t)
+    copy_stem(s.stem[0], s.stem[1])
+    s.fault[1].f4 = cfg.wide_play - cfg.act.stem_play
+    s.filled = 0
+    s.steady = 0
+    for i in range(4):
+        s.cv[i] = cv
+    s.dp[0] = p1 - p2
+    s.dp[1] = p1 - p2
+    s.xm[:] = 0.0
+    s.xd = 0.0
+    for i in range(TAPS):
+        s.past[0, i] = p1
+        s.past[1, i] = p2
+    s.p_hat[0] = p1
+    s.p_hat[1] = p2
+
+
+@jit
+def count_repeats(s: Any, cv: float, x: float, p1: float, p2: float, flow: float) -> None:
+    """Count samples in a row whose values are all those of the sample before."""
+    now = (cv, x, p1, p2, flow)
+    same = True
+    for i in range(5):
+        value = now[i]
+        if value != s.last[i] and not (math.isnan(value) and math.isnan(s.last[i])):
+            same = False
+        s.last[i] = value
+    s.repeats = s.repeats + 1 if same else 0
+
+
+@jit
+def repeated(s: Any) -> bool:
+    """
+    Tell whether a sample is a copy of the one before, as historians make where one is late.
+
+    More than a few in a row are a valve at rest or a compressed record, not copies.
+    """
+    return 0 < s.repeats <= COPIES
+
+
+@jit
+def settling(cfg: Any, ref: Any) -> float:
+    """Return how long the models take from a start at the measured position, s."""
+    if ref.stem_kind != LAW:
+        value: float = cfg.settle_s
+        return value
+    law = ref.stem_law
+    return min(cfg.settle_s, law.dead_s + 5.0 * law.lag_s + SETTLING_PERIODS * ref.period)
+
+
+@jit
+def filter_pressures(s: Any, ref: Any, p1: float, p2: float) -> None:
+    """Fuse each pressure with its prediction; a single value far from it is not believed at once."""
+    s.innovation[:] = math.nan
+    for i in range(2):
+        measured = p1 if i == 0 else p2
+        filt = ref.pressure[i]
+        kept = measured
+        if math.isnan(measured) or s.filled < TAPS or not filt.sigma > 0.0:
+            s.p_hat[i] = measured
+            s.doubtful[i] = 0
+        else:
+            predicted = predict_pressure(filt, s.past[i])
+            far = abs(measured - predicted) > GATE * filt.sigma
+            if far and s.doubtful[i] == 0 and s.steady > 1:
+                s.doubtful[i] = 1
+                s.p_hat[i] = predicted
+                kept = predicted
+            else:
+                s.doubtful[i] = 0
+                s.p_hat[i] = fuse_pressure(filt, s.past[i], measured)
+            if s.steady > TAPS:
+                s.innovation[i] = innovation(filt, s.past[i], measured)
+        if math.isnan(kept):
+            continue
+        push(s.past[i], kept)
+
+
+@jit
+def predict(
+    s: Any,
+    cfg: Any,
+    ref: Any,
+    t: float,
+    cv: float,
+    x: float,
+    p1: float,
+    p2: float,
+    t1: float,
+    flow: float,
+) -> None:
+    """
+    Bring filter, models and regressors to the sample at t (sheet steps 1, 2, 4).
+
+    :param s: record of `MONITOR`.
+    :param cfg: record of `SETTINGS`.
+    :param ref: record of `REFERENCE`.
+    :param t: time, s; the other inputs are scaled to 0..1, NaN for t1, flow where not measured.
+    """
+    if s.samples == 0:
+        s.t_first = t
+        s.t_test = t + cfg.t_on_s
+        restart(s, cfg, ref, t, cv, x, p1, p2)
+    elif t - s.t > max(cfg.gap_s, GAP_PERIODS * ref.period):
+        s.t_test = max(s.t_test, t + settling(cfg, ref))
+        restart(s, cfg, ref, t, cv, x, p1, p2)
+    entry = s.history[s.samples % HISTORY_LENGTH]
+    t0 = s.t if s.filled > 0 else t
+    s.samples += 1
+    s.t = t
+    count_repeats(s, cv, x, p1, p2, flow)
+    if not repeated(s):
+        advance_track(s.track, ref.stem_law, t, cv)
+    law = ref.stem_kind == LAW
+    if not law:
+        copy_stem(s.stem[0], entry.stem)
+    period = max(cfg.period_s, ref.period)
+    s.steady = s.steady + 1 if t - t0 < 1.5 * period else 1
+    filter_pressures(s, ref, p1, p2)
+    z2 = s.dp[1]
+    z1 = s.dp[0]
+    z0 = s.p_hat[0] - s.p_hat[1]
+    s.dp[1] = z1
+    s.dp[0] = z0
+    for i in range(3, 0, -1):
+        s.cv[i] = s.cv[i - 1]
+    s.cv[0] = cv
+    s.xm[2] = s.xm[1]
+    s.xm[1] = s.xm[0]
+    if abs(cv - s.cv[1]) > ref.cv_jump:
+        s.t_stem = t + cfg.settle_s
+    slope0 = 0.0
+    slope1 = 0.0
+    entry.cv = cv
+    if law:
+        s.xm[0] = position(s.track, ref.stem_law, 0)
+        s.xs = position(s.track, ref.stem_law, 1)
+        s.xd = s.xm[0]
+    elif s.filled > 0:
+        dt = t - t0
+        regular = s.filled >= 2 and dt < 1.5 * period
+        if regular:
+            following = predict_pressure(ref.pressure[0], s.past[0])
+            following -= predict_pressure(ref.pressure[1], s.past[1])
+            slope0 = (z0 - z2) / (2.0 * dt)
+            slope1 = (following - z1) / (2.0 * dt)
+        else:
+            slope0 = (z0 - z1) / dt
+            slope1 = slope0
+        cv1 = s.cv[1] if ref.hold else cv
+        s.xm[0] = advance_stem(
+            s.stem[0], cfg.act, s.fault[0], t0, t, s.cv[1], cv1, z1, z0, slope0, slope1
+        )
+        s.xd = advance_stem(
+            s.stem[1], cfg.act, s.fault[1], t0, t, s.cv[1], cv1, z1, z0, slope0, slope1
+        )
+        s.xs = s.xm[0]
+        entry.cv = cv1
+    s.filled += 1
+    xm = s.xm[0]
+    s.phi[0] = 1.0
+    s.phi[1] = xm - 0.5
+    s.phi[2] = 30.0 * (cv - s.cv[1])
+    for i in range(4):
+        s.phi[3 + i] = s.cv[i] - xm
+    s.phi[7] = s.xm[1] - xm
+    s.phi[8] = s.xm[2] - xm
+    s.phi[9] = z0 - ref.dp_mean
+    s.phi[10] = z1 - ref.dp_mean
+    if ref.flow_kind == LAW:
+        predict_by_law(s, ref, x, p1, p2, t1, flow, t - t0)
+    else:
+        predict_flow(s, cfg, ref, x, t1, flow)
+    entry.t0 = t0
+    entry.t = t
+    entry.cv0 = s.cv[1]
+    entry.dp0 = z1
+    entry.dp = z0
+    entry.slope0 = slope0
+    entry.slope = slope1
+    entry.x = x
+    entry.p1 = s.p_hat[0]
+    entry.p2 = s.p_hat[1]
+    entry.t1 = t1
+    entry.flow = flow
+    entry.f = s.f
+    entry.sq = s.sq
+    entry.masked = s.masked
+    entry.xm = xm
+
+
+@jit
+def predict_flow(s: Any, cfg: Any, ref: Any, x: float, t1: float, flow: float) -> None:
+    """Predict F' from the valve equation, with the sigma that follows from the sensors' noise."""
+    s.f = math.nan
+    s.f_model = math.nan
+    s.sq = 1.0
+    s.masked = True
+    if math.isnan(t1) or math.isnan(flow):
+        return
+    p1 = s.p_hat[0]
+    p2 = s.p_hat[1]
+    s.f = nominal_flow(cfg.act, x, p1, p2, t1)
+    fx = (
+        nominal_flow(cfg.act, x + 0.002, p1, p2, t1) - nominal_flow(cfg.act, x - 0.002, p1, p2, t1)
+    ) / 0.004
+    fp = s.f / (2.0 * max(p1 - p2, 0.02))
+    c = ref.pressure[0].c + ref.pressure[1].c
+    s.sq = cfg.sigma * math.sqrt(1.0 + fx * fx + fp * fp * c)
+    # the mask follows the model: one on the noisy f itself would select f's errors
+    s.f_model = nominal_flow(cfg.act, s.xm[0], p1, p2, t1)
+    s.masked = s.f > cfg.flow_high and flow > cfg.flow_high and s.f_model > cfg.model_high
+
+
+@jit
+def predict_by_law(
+    s: Any, ref: Any, x: float, p1: float, p2: float, t1: float, flow: float, dt: float
+) -> None:
+    """Predict F' by the flow law; sigma is that of the meter and of what the record left."""
+    law = ref.flow_law
+    s.f = math.nan
+    s.sq = 1.0
+    s.masked = True
+    s.flat = s.flat + 1 if flow == s.last_flow else 0
+    s.last_flow = flow
+    s.size = sizing(law.medium, p1, p2, t1)
+    if math.isnan(x) or math.isnan(s.size) or math.isnan(flow) or math.isinf(s.size):
+        return
+    f = math.exp(characteristic(law, x) + s.size)
+    if math.isnan(s.f_lagged) or not law.lag_s > 0.0:
+        s.f_lagged = f
+    else:
+        s.f_lagged += (1.0 - math.exp(-dt / law.lag_s)) * (f - s.f_lagged)
+    s.f = s.f_lagged
+    s.sq = math.sqrt(law.noise * law.noise + s.f * s.f * law.spread * law.spread)
+    s.masked = False

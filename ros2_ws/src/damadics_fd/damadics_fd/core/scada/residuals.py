@@ -1,0 +1,168 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Form the residuals of one sample, less what the models do not know for sure."""
+
+import math
+from typing import Any
+
+from damadics_fd.core.jit import jit
+from damadics_fd.core.scada.cusum import P1, P2, PROCESS, R1, R2, T1
+from damadics_fd.core.scada.flow_law import flow_doubt
+from damadics_fd.core.scada.predict import repeated
+from damadics_fd.core.scada.state import HISTORY_LENGTH, LAW, N_WEIGHTS
+from damadics_fd.core.scada.stem_law import outside, stem_doubt, transient_doubt
+
+DOUBT = 3.0  # standard deviations of a law that are no evidence
+STOP = 0.015  # this near to an end of the stroke the stem is at its stop
+STOP_DOUBT = 0.05  # of the stroke, at a stop and for a while after it has left
+STOP_S = 60.0
+# What a quarter of an hour does not show and a day does: how a plant changes over hours.
+HOURS_S = 10800.0
+STEM_HOURS = 0.0025  # standard deviation, share of stroke
+FLOW_HOURS = 0.05  # share of the flow
+END = 0.985  # of the meter's range: it shows no more
+LEAST = 0.03  # of the meter's range: it shows no less
+FLAT = 3  # equal flows in a row, above all learned: the end of an unknown range
+FOLLOW_S = 600.0  # a process pressure is followed this slowly
+FOLLOW_FAR_S = 3600.0  # and this slowly while it is far off
+MOVED = 0.03  # a flow that moved by this share explains a pressure
+
+
+@jit
+def hours_unseen(ref: Any) -> float:
+    """Return which part of the slow changes of a plant the record was too short to show, 0..1."""
+    value: float = math.sqrt(HOURS_S / (HOURS_S + ref.seconds))
+    return value
+
+
+@jit
+def shrink(value: float, allowance: float) -> float:
+    """
+    Return what of a residual lies beyond an allowance.
+
+    >>> shrink(0.5, 0.2), shrink(-0.1, 0.2)
+    (0.3, 0.0)
+    """
+    return math.copysign(max(abs(value) - allowance, 0.0), value)
+
+
+@jit
+def residuals(s: Any, ref: Any, x: float, p1: float, p2: float, t1: float, flow: float) -> None:
+    """Form r1 = X' - model, r2 = (F' - flow law) / sigma and what the inputs show."""
+    s.testable[:] = 1
+    entry = s.history[(s.samples - 1) % HISTORY_LENGTH]
+    correction = 0.0
+    xm = s.xm[0]
+    if ref.stem_kind == LAW:
+        raw = outside(x, xm, s.xs)
+        doubt = DOUBT * stem_doubt(ref.stem_law, xm) + DOUBT * STEM_HOURS * hours_unseen(ref)
+        doubt += transient_doubt(s.track, ref.stem_law)
+        s.lever[0] = 1.0
+    else:
+        for i in range(N_WEIGHTS):
+            correction += ref.w[i] * s.phi[i]
+        raw = x - xm - correction
+        doubt = 0.0
+        s.lever[0] = lever(xm, ref.x_mean, ref.x_sd)
+    if min(xm, s.cv[0]) < STOP or max(xm, s.cv[0]) > 1.0 - STOP:
+        s.t_stop = s.t + STOP_S
+    if s.t < s.t_stop:
+        doubt += STOP_DOUBT
+    s.residual[R1] = shrink(raw, doubt)
+    s.residual[R2] = flow_residual(s, ref, x, flow)
+    s.testable[R1] = 1 if s.t >= s.t_stem else 0
+    if repeated(s) and ref.stem_kind == LAW:
+        s.testable[R1] = 0
+    if repeated(s) and ref.flow_kind == LAW:
+        s.testable[R2] = 0
+    s.residual[P1] = s.innovation[0]
+    s.residual[P2] = s.innovation[1]
+    s.residual[T1] = t1
+    s.residual[PROCESS] = process_residual(s, ref, p1, p2, flow)
+    entry.correction = correction
+    entry.r1 = raw
+    entry.r2 = s.residual[R2]
+
+
+@jit
+def lever(at: float, mean: float, sd: float) -> float:
+    """Return the standard error at a place over that in the middle of what was learned."""
+    away = (at - mean) / sd
+    return math.sqrt(1.0 + away * away)
+
+
+@jit
+def flow_residual(s: Any, ref: Any, x: float, flow: float) -> float:
+    """Return r2 in sigma; 0 and not testable where meter or law say nothing."""
+    s.lever[1] = 1.0
+    if ref.flow_kind != LAW:
+        if s.masked:
+            s.testable[R2] = 0
+            return math.nan if math.isnan(s.f) else 0.0
+        s.lever[1] = lever(s.f, ref.f_mean, ref.f_sd)
+        return (flow - ref.g0 - ref.g1 * s.f) / s.sq  # NaN where not measured
+    law = ref.flow_law
+    s.testable[R2] = 0
+    if s.masked:
+        return math.nan if math.isnan(flow) else 0.0
+    hours = FLOW_HOURS * hours_unseen(ref)
+    doubt = flow_doubt(law, x, s.size)
+    band = math.exp(DOUBT * math.sqrt(doubt * doubt + hours * hours))
+    scale = law.range if law.range > 0.0 else ref.flow_max
+    floor = 0.005 * scale
+    low = s.f / band - floor
+    high = s.f * band + floor
+    ended = law.range > 0.0 and flow >= END * law.range
+    if law.range <= 0.0 and s.flat >= FLAT and flow > ref.flow_max:
+        ended = True
+    if ended:
+        low = -math.inf  # the flow may be anything above what is shown
+    elif flow < LEAST * scale:
+        low = min(low, LEAST * scale)  # and here anything below
+        if low < LEAST * scale * 1.5:
+            low = -math.inf
+    value = 0.0
+    if flow > high:
+        value = flow - high
+    elif flow < low:
+        value = flow - low
+    s.testable[R2] = 1 if value != 0.0 or not ended else 0
+    return value / s.sq
+
+
+@jit
+def process_residual(s: Any, ref: Any, p1: float, p2: float, flow: float) -> float:
+    """
+    Return 1 where a pressure left its level so far and so fast that no load change explains it.
+
+    A load change moves pressures and flow together: more flow takes the inlet pressure down and the
+    outlet pressure up. A pressure that moves against the flow, or without it, is the plant's own.
+    """
+    if not ref.drop > 0.0 or math.isnan(p1) or math.isnan(p2):
+        s.testable[PROCESS] = 0
+        return math.nan
+    if s.filled <= 1:
+        s.level[0] = p1
+        s.level[1] = p2
+        s.level_flow = flow
+    dt = s.t - s.history[(s.samples - 1) % HISTORY_LENGTH].t0
+    d1 = p1 - s.level[0]
+    d2 = p2 - s.level[1]
+    more = 0.0
+    if not math.isnan(flow):
+        change = (flow - s.level_flow) / max(s.level_flow, 0.02 * ref.flow_max)
+        ended = flow >= END * ref.flow_law.range and ref.flow_law.range > 0.0
+        more = 1.0 if ended or change > MOVED else -1.0 if change < -MOVED else 0.0
+    fell = d1 < -ref.swing[0] and more <= 0.0
+    rose = d1 > ref.swing[0] and more >= 0.0
+    fell2 = d2 < -ref.swing[1] and more >= 0.0
+    rose2 = d2 > ref.swing[1] and more <= 0.0
+    far = fell or rose or fell2 or rose2
+    share = 1.0 - math.exp(-dt / (FOLLOW_FAR_S if far else FOLLOW_S))
+    s.level[0] += share * d1
+    s.level[1] += share * d2
+    if not math.isnan(flow):
+        if math.isnan(s.level_flow):
+            s.level_flow = flow
+        s.level_flow += share * (flow - s.level_flow)
+    return 1.0 if far else 0.0

@@ -1,0 +1,167 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""
+A stem as anyone's positioner moves it: dead time, first-order lag, rate limits, dead band.
+
+The law runs on CV alone and never looks at the measured position, so a stem that stands still or
+is off by a little shows for as long as it lasts. A second copy moves no faster than the law has been
+seen to move while it was right: between the two lies what was not learned, and a stem that is
+found there is no evidence against the valve.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from damadics_fd.core.jit import jit
+
+DELAYS = 64  # samples of CV kept for the dead time
+FADE_LAGS, FADE_S = 3.0, 5.0  # how long a motion is remembered
+TRANSIENT = 0.1  # of the way still to go that a law knows no better
+FAST = 1e3  # a rate that limits nothing, 1/s
+
+STEM_LAW = np.dtype(
+    (
+        np.record,
+        [
+            ('dead_s', np.float64),  # dead time of CV
+            ('lag_s', np.float64),  # first-order lag
+            ('rise', np.float64),  # fastest closing, stroke/s
+            ('fall', np.float64),  # fastest opening
+            ('slow_rise', np.float64),  # fastest closing at which the law was seen to hold
+            ('slow_fall', np.float64),
+            ('transient', np.float64),  # doubt while it moves, share of the way still to go
+            ('band', np.float64),  # dead band, share of stroke
+            ('gain', np.float64),
+            ('offset', np.float64),
+            ('centre', np.float64),  # mean position learned at
+            ('v_offset', np.float64),  # variances of offset and gain
+            ('v_gain', np.float64),
+        ],
+    )
+)
+
+STEM_TRACK = np.dtype(
+    (
+        np.record,
+        [
+            ('count', np.int64),
+            ('t', np.float64, (DELAYS,)),
+            ('cv', np.float64, (DELAYS,)),
+            ('ahead', np.float64),  # how far the law has still to go
+            ('was_ahead', np.float64),  # the same, or a little while ago
+            ('lagged', np.float64, (2,)),  # after lag and rate: the law, its slow copy
+            ('held', np.float64, (2,)),  # after the dead band
+        ],
+    )
+)
+
+
+@jit
+def start_track(s: Any, t: float, cv: float) -> None:
+    """Start at rest where CV is."""
+    s.count = 0
+    s.t[:] = t
+    s.cv[:] = cv
+    s.lagged[:] = cv
+    s.held[:] = cv
+    s.ahead = 0.0
+    s.was_ahead = 0.0
+
+
+@jit
+def delayed(s: Any, time: float) -> Any:
+    """Return CV at a time, by straight lines between the samples that are kept."""
+    newest = s.count % DELAYS
+    for back in range(DELAYS - 1):
+        i = (newest - back) % DELAYS
+        before = (i - 1) % DELAYS
+        if back >= s.count or s.t[before] <= time:
+            span = s.t[i] - s.t[before]
+            if back >= s.count or span <= 0.0:
+                return s.cv[i]
+            share = min(max((time - s.t[before]) / span, 0.0), 1.0)
+            return s.cv[before] + share * (s.cv[i] - s.cv[before])
+    return s.cv[(newest + 1) % DELAYS]
+
+
+@jit
+def advance_track(s: Any, law: Any, t: float, cv: float) -> None:
+    """
+    Take CV at t; `position` then tells where the stem should be.
+
+    :param s: record of `STEM_TRACK`.
+    :param law: record of `STEM_LAW`.
+    :param t: time, s; cv: 0..1.
+    """
+    dt = t - s.t[s.count % DELAYS]
+    s.count += 1
+    i = s.count % DELAYS
+    s.t[i] = t
+    s.cv[i] = cv
+    if dt <= 0.0:
+        return
+    # the command in the middle of the interval stands for the interval
+    command = min(max(delayed(s, t - law.dead_s - 0.5 * min(dt, law.lag_s)), 0.0), 1.0)
+    fade = math.exp(-dt / (FADE_LAGS * law.lag_s + FADE_S))
+    s.ahead = abs(command - s.lagged[0])
+    s.was_ahead = max(s.ahead, s.was_ahead * fade)
+    share = 1.0 - math.exp(-dt / law.lag_s) if law.lag_s > 0.0 else 1.0
+    half = 0.5 * law.band
+    for k in range(2):
+        rise = (law.slow_rise if k == 1 else law.rise) * dt
+        fall = (law.slow_fall if k == 1 else law.fall) * dt
+        move = share * (command - s.lagged[k])
+        s.lagged[k] += min(max(move, -fall), rise)
+        s.held[k] = min(max(s.held[k], s.lagged[k] - half), s.lagged[k] + half)
+
+
+@jit
+def position(s: Any, law: Any, k: int) -> float:
+    """Return the position of the law (0) or of its slow copy (1), 0..1."""
+    x: float = law.offset + law.gain * s.held[k]
+    return min(max(x, 0.0), 1.0)
+
+
+@jit
+def outside(x: float, first: float, second: float) -> float:
+    """
+    Return by how much x lies outside what two models span, 0 between them.
+
+    >>> outside(0.5, 0.2, 0.6), round(outside(0.7, 0.2, 0.6), 3), outside(0.1, 0.6, 0.2) < 0
+    (0.0, 0.1, True)
+    """
+    low = min(first, second)
+    high = max(first, second)
+    return x - high if x > high else min(x - low, 0.0)
+
+
+@jit
+def stem_doubt(law: Any, x: float) -> float:
+    """Return the standard deviation of the law's mean at x: small where it was learned."""
+    away = x - law.centre
+    return math.sqrt(law.v_offset + law.v_gain * away * away)
+
+
+@jit
+def transient_doubt(s: Any, law: Any) -> float:
+    """Return by how much the law may be wrong because it moves, or moved a little while ago."""
+    value: float = TRANSIENT * s.ahead + (law.transient - TRANSIENT) * s.was_ahead
+    return value
+
+
+@jit
+def follow_record(
+    law: np.ndarray, track: np.ndarray, t: np.ndarray, cv: np.ndarray, out: np.ndarray
+) -> None:
+    """Run the law and its slow copy over a record; `out` gets shape (n, 3): both with gain 1
+    and offset 0, and the way still to go."""
+    s = track[0]
+    p = law[0]
+    start_track(s, t[0], cv[0])
+    for i in range(t.size):
+        advance_track(s, p, t[i], cv[i])
+        out[i, 0] = s.held[0]
+        out[i, 1] = s.held[1]
+        out[i, 2] = s.was_ahead
