@@ -17,9 +17,8 @@ from damadics_fd.core.quality import Refused
 from damadics_fd.core.record import Array, Floats, Ints, Plain, Saved
 from damadics_fd.core.scada.kernel import Shown, take_column, write
 from damadics_fd.core.scada.monitor import ScadaMonitor
-from damadics_fd.core.scada.pressure import PRESSURE
 from damadics_fd.core.scada.settings import ScadaSettings
-from damadics_fd.core.scada.state import MONITOR, REFERENCE
+from damadics_fd.core.scada.state import MONITOR, Reference
 from damadics_fd.core.settings import Settings
 
 BLANK = np.zeros(1, MONITOR)
@@ -213,9 +212,7 @@ class ScadaEstimator(Intake):
         reference = self.monitor.reference
         if reference is None:
             raise ValueError(f'nothing to save: {self.status}')
-        flat = {name: reference[0][name] for name in _PLAIN}
-        flat |= {f'pressure_{name}': reference[0]['pressure'][name] for name in _FILTER}
-        return {name: np.asarray(value).tolist() for name, value in flat.items()}
+        return Reference.plain(reference)
 
     def restore(self, learned: Mapping[str, Plain]) -> None:
         """
@@ -224,20 +221,7 @@ class ScadaEstimator(Intake):
         :param learned: what was learned.
         :raises ValueError: where it is not that; the monitor is then untouched.
         """
-        reference = np.zeros(1, REFERENCE)
-        wrong = sorted(set(learned) ^ {*_PLAIN, *(f'pressure_{name}' for name in _FILTER)})
-        if wrong:
-            raise ValueError(f'learned state: {", ".join(wrong)} missing or unknown')
-        for name, value in learned.items():
-            part = name.removeprefix('pressure_')
-            target = reference[0]['pressure'] if part != name else reference[0]
-            try:
-                array = np.asarray(value, float)
-            except (TypeError, ValueError, OverflowError) as error:
-                raise ValueError(f'learned state: {name} = {value!r}: {error}') from error
-            if array.shape != np.shape(target[part]) or not np.isfinite(array).all():
-                raise ValueError(f'learned state: {name} = {value!r} does not fit')
-            target[part] = array
+        reference = Reference.read(learned, 'learned state')
         if not (reference['s1'] > 0.0).all() or not (reference['llr_limit'] > 0.0).all():
             raise ValueError('learned state: s1 and llr_limit must be positive')
         self.monitor = ScadaMonitor(self.monitor.settings, reference)
@@ -250,7 +234,3 @@ class ScadaEstimator(Intake):
         """
         self.monitor.forget()
         self.shown['phase'] = PHASE_LEARN_PHI
-
-
-_PLAIN = tuple(name for name in REFERENCE.names or () if name != 'pressure')
-_FILTER = tuple(PRESSURE.names or ())

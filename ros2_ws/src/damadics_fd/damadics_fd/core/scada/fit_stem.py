@@ -1,6 +1,6 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Identify the stem law from fault-free records: lag, dead time, rates, dead band, gain, offset."""
+"""Identify the stem law from fault-free records."""
 
 import math
 from collections.abc import Sequence
@@ -62,7 +62,7 @@ class StemFit:
 
 
 def run_law(law: NDArray, pieces: Sequence[Piece]) -> Floats:
-    """Return law and slow copy over all pieces with gain 1 and offset 0 and the way to go, (n, 3)."""
+    """Return law, slow copy (gain 1, offset 0) and the way to go over all pieces, (n, 3)."""
     track = np.zeros(1, STEM_TRACK)
     out = []
     for piece in pieces:
@@ -103,7 +103,9 @@ def fit_stem(pieces: Sequence[Piece], period: float) -> StemFit:
     for name in ('lag_s', 'dead_s', 'rise', 'fall', 'band'):
         value = float(law[name][0])
         if 0.0 < value < FAST:
-            best = _search(law, name, [value * f for f in (0.75, 0.87, 1.15, 1.3)], best, pieces, x)
+            best = _search(
+                law, name, [value * f for f in (0.75, 0.87, 1.15, 1.3)], best, pieces, x
+            )
     _proven(law, pieces)
     return _finish(law, pieces, x)
 
@@ -151,7 +153,7 @@ def _proven(law: NDArray, pieces: Sequence[Piece]) -> None:
 
 
 def _transient(left: Floats, ahead: Floats, sigma: float) -> float:
-    """Return which share of the way still to go the law is wrong by, at the most, in large moves."""
+    """Return by which share of the way still to go the law errs in large moves."""
     large = ahead > LARGE * sigma
     if large.sum() < 10:
         return TRANSIENT

@@ -3,18 +3,17 @@
 """
 The flow through anyone's valve: a monotone characteristic of knots times the sizing equation.
 
-log F = c(X) + s(P1, P2, T1): c runs by straight lines through knots, s is the square root of dP rho
+log F = c(X) + s(P1, P2, T1): c runs by straight lines through knots, s is half the log of dP rho
 for a liquid (IEC 60534-2-1, choked by P1 - p_v) and of x rho_1 Y^2 for a gas or steam. What the
 record does not say about c comes from a prior that any control valve obeys, so the law knows how
 little it knows away from where it was learned (`flow_doubt`).
 """
 
 import math
-from typing import Any
-
-import numpy as np
+from typing import Annotated
 
 from damadics_fd.core.jit import jit
+from damadics_fd.core.record import Floats, Record
 from damadics_fd.core.scada.actuator import P_RANGE, T_RANGE
 from damadics_fd.core.valve.flow import density, vapour_pressure
 
@@ -25,21 +24,21 @@ LEAST_DROP = 1e-4  # of the inlet pressure: below it there is nothing to divide 
 CRITICAL = 0.7  # x_T, ratio of the pressure drop at which a globe valve chokes on gas
 RECOVERY = 0.81  # F_L^2 of a globe valve
 
-FLOW_LAW = np.dtype(
-    (
-        np.record,
-        [
-            ('medium', np.int64),
-            ('c', np.float64, (KNOTS,)),  # log of the capacity at X = 0, 0.1 .. 1
-            ('size0', np.float64),  # mean of the sizing term
-            ('lag_s', np.float64),  # of the flow meter
-            ('noise', np.float64),  # of F, absolute, scaled
-            ('spread', np.float64),  # of log F beyond it
-            ('range', np.float64),  # end of the meter's range, scaled; 0 unknown
-            ('v', np.float64, (KNOTS + 1, KNOTS + 1)),  # covariance of c and of the exponent's error
-        ],
-    )
-)
+
+class FlowLaw(Record):
+    """What is known of the flow through a valve, and how well."""
+
+    medium: int
+    c: Annotated[Floats, KNOTS]  # log of the capacity at X = 0, 0.1 .. 1
+    size0: float  # mean of the sizing term
+    lag_s: float  # of the flow meter
+    noise: float  # of F, absolute, scaled
+    spread: float  # of log F beyond it
+    range: float  # end of the meter's range, scaled; 0 unknown
+    v: Annotated[Floats, KNOTS + 1, KNOTS + 1]  # covariance of c and of the exponent's error
+
+
+FLOW_LAW = FlowLaw.dtype()
 
 
 @jit
@@ -66,7 +65,7 @@ def sizing(medium: int, p1: float, p2: float, t1: float) -> float:
 
 
 @jit
-def characteristic(law: Any, x: float) -> float:
+def characteristic(law: FlowLaw, x: float) -> float:
     """Return c(X) by straight lines between the knots, held beyond both ends."""
     place = min(max(x, 0.0), 1.0) / STEP
     i = min(int(place), KNOTS - 2)
@@ -76,7 +75,7 @@ def characteristic(law: Any, x: float) -> float:
 
 
 @jit
-def slope(law: Any, x: float) -> float:
+def slope(law: FlowLaw, x: float) -> float:
     """Return dc/dX at X."""
     i = min(int(min(max(x, 0.0), 1.0) / STEP), KNOTS - 2)
     value: float = (law.c[i + 1] - law.c[i]) / STEP
@@ -84,7 +83,7 @@ def slope(law: Any, x: float) -> float:
 
 
 @jit
-def flow_doubt(law: Any, x: float, size: float) -> float:
+def flow_doubt(law: FlowLaw, x: float, size: float) -> float:
     """Return the standard deviation of the law's own log F at a position and a sizing term."""
     place = min(max(x, 0.0), 1.0) / STEP
     i = min(int(place), KNOTS - 2)

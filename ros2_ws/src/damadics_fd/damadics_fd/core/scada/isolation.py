@@ -205,9 +205,9 @@ class Isolator:
             if test.residual >= P1 and state['ratios'][i] >= 1.0
         }
         p1, p2 = self._ref['pressure']['mean']
-        if not math.isnan(float(state['t_shown'][PROCESS])):
-            if state['t_shown'][PROCESS] <= np.nanmin(state['t_shown']) + PROCESS_FIRST_S:
-                return [Hypothesis(17, math.nan, 0.0)]
+        first = state['t_shown'][PROCESS]  # NaN: it did not show
+        if first <= np.nanmin([*state['t_shown'], math.inf]) + PROCESS_FIRST_S:
+            return [Hypothesis(17, math.nan, 0.0)]
         if T1 in fired:
             shift = T_RANGE * float(np.nanmean(window['t1']) - self._mean_t1)
             if shift > 0.0:

@@ -117,7 +117,7 @@ def take(
     :param c: settings record.
     :param settings: record of the monitor's own settings, in an array of length 1.
     :param reference: records of `REFERENCE`.
-    :param blank: a record of `MONITOR` of zeros, in an array of length 1.
+    :param blank: a record of `MonitorState` of zeros, in an array of length 1.
     :param row: work space, shape (7,).
     :param e: estimate, written where the sample is accepted.
     :param stamp: the sample's stamp [ns]; its signals follow.

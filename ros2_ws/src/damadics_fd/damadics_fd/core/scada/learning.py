@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from damadics_fd.core.jit import jit
 from damadics_fd.core.scada.clean import despiked, period_of, split
-from damadics_fd.core.scada.cusum import R1, R2, T1
+from damadics_fd.core.scada.cusum import R1
 from damadics_fd.core.scada.fit_flow import FlowFit, better_medium
 from damadics_fd.core.scada.fit_stem import Piece, StemFit, fit_stem
-from damadics_fd.core.scada.limits import friction_limit, set_limits
+from damadics_fd.core.scada.limits import friction_limit, is_stationary, set_limits
 from damadics_fd.core.scada.plausible import LearningError, check_flow, check_stem
 from damadics_fd.core.scada.pressure import learn_pressure
 from damadics_fd.core.scada.residuals import residuals
@@ -37,6 +37,7 @@ STATED = 0.8  # share to which the stated actuator must cut the variance of an i
 # ... or equal it and leave no more than the sensors' noise
 NEARLY, SENSOR = 1.1, 1.5
 LEAST_SAMPLES = 200
+OFF = 1e9  # a limit that is never reached
 NEVER = 9.0  # a change of CV, which is 0..1, is never as large
 JUMPS = (0.05, 3.0)  # a jump of CV is more than this, and than this times the largest learned
 STATED_FLOW = (1.5, 0.1, 0.05)  # sigma, gain and offset with which the stated flow law is right
@@ -85,7 +86,10 @@ def _predict_record(
 
 
 def learn(
-    samples: Floats, settings: ScadaSettings, until: float | None = None, notes: list[str] | None = None
+    samples: Floats,
+    settings: ScadaSettings,
+    until: float | None = None,
+    notes: list[str] | None = None,
 ) -> NDArray:
     """
     Return the reference learned from a fault-free record (sheet section 1.3).
@@ -126,7 +130,7 @@ def learn(
     if pressures:
         _learn_inputs(ref, reference, part, settings)
         prediction = _choose_stem(ref, reference, clean, part, settings, window, identified)
-        wandering = not all(stationary(v) for v in part[:, 3:6].T if not np.isnan(v).all())
+        wandering = not all(is_stationary(v) for v in part[:, 3:6].T if not np.isnan(v).all())
     else:
         ref['stem_kind'] = LAW
         ref['w'][:] = 0.0
@@ -143,7 +147,7 @@ def learn(
     if ref['stem_kind'] == NOMINAL and prediction is not None:
         friction_limit(ref, settings, values[:, R1], prediction.xm - prediction.xd, wandering)
     else:
-        ref['s1'], ref['kap2'], ref['llr_limit'] = sigma[R1], 1.0, math.inf
+        ref['s1'], ref['kap2'], ref['llr_limit'] = sigma[R1], 1.0, OFF
     return reference
 
 
@@ -176,7 +180,7 @@ def _choose_stem(
     window: NDArray,
     identified: StemFit,
 ) -> Prediction:
-    """Take the stated actuator or the identified law, whichever predicts the second half better."""
+    """Take the stated actuator or the identified law: what predicts the second half better."""
     x = part[:, X]
     ref['stem_kind'] = NOMINAL
     candidates = [_predict(clean, settings, reference, window, hold) for hold in (False, True)]
@@ -271,7 +275,13 @@ def _choose_flow(
     pressures = (part[:, PRESSURE_1], part[:, PRESSURE_2], part[:, TEMPERATURE])
     if not stated:
         fit = better_medium(
-            part[:, T], part[:, X], identified.x[:, 0], pressures, flow, flow_range, settings.medium
+            part[:, T],
+            part[:, X],
+            identified.x[:, 0],
+            pressures,
+            flow,
+            flow_range,
+            settings.medium,
         )
         if fit is None:
             ref['flow_law']['range'] = flow_range
@@ -345,13 +355,3 @@ def _slow_flow_sigma(
         return 1.0
     passed = 2.0 - float(ref['pressure']['c'].sum())
     return math.sqrt(1.0 + passed * float(share[fit].mean()))
-
-
-def stationary(values: Floats) -> bool:
-    """Tell whether an input has no slow component, so that its mean can be tested."""
-    from damadics_fd.core.scada.limits import is_stationary
-
-    return is_stationary(values[np.isfinite(values)])
-
-
-_ = (R2, T1)

@@ -26,6 +26,7 @@ STATIONARY = 1.3  # sigma of 30 s blocks over sigma of samples, above it an inpu
 STANDARD_ERRORS = {1: 0.0, 5: 4.0, 10: 4.0, 30: 5.0}
 DISTANCE_ERRORS = 4.0  # and with the distance from what was learned, where the above is 0
 SLOW = 30  # block of the tests that sum up hundreds of samples
+SLOWEST_OF_LAW = 0.15
 LAW_MARGIN = 1.0  # of an identified law, whose residual is neither white nor normal
 LEAST = 200
 
@@ -73,6 +74,7 @@ def block_sigma(values: Floats, length: int) -> float:
 
 def is_stationary(values: Floats) -> bool:
     """Tell whether an input has no slow component, so that its mean can be tested."""
+    values = values[np.isfinite(values)]
     sigma = block_sigma(values, 1)
     blocks = values.size // 30
     return bool(block_sigma(values, 30) <= sigma * (STATIONARY + 1.0 / math.sqrt(blocks)))
@@ -108,7 +110,7 @@ def set_limits(
     :param ref: record of `REFERENCE`, written.
     :param settings: budget and period.
     :param values: the residuals over the record, one column each, NaN where not testable.
-    :param sigma: of a residual whose law left more than `values` show (a dead zone); NaN: learn it.
+    :param sigma: of a residual with a dead zone, whose `values` show too little; NaN: learn it.
     :param slow: factor on sigma for sums of r2 over many samples.
     :param wandering: the inputs have no constant mean.
     """
@@ -155,7 +157,7 @@ def set_limits(
 def _of_law(ref: Any, i: int, r: Floats, sigma: float, arl: float) -> None:
     """Set one test of an identified law: the dead zone is in the residual, its mean is 0."""
     test = TESTS[i]
-    if test.k0 < 0.5:
+    if test.k0 < SLOWEST_OF_LAW:
         return  # slower than the changes a plant makes by itself
     one = sigma if sigma > 0.0 else max(spread_of(r), 1.0)
     sd = max(one, block_spread(r, test.block))

@@ -8,11 +8,9 @@ is not conserved through the play there, and a model with one state would drift 
 """
 
 import math
-from typing import Any
-
-import numpy as np
 
 from damadics_fd.core.jit import jit
+from damadics_fd.core.record import Record
 from damadics_fd.core.scada.actuator import P_RANGE
 from damadics_fd.core.valve.parameters import Valve
 from damadics_fd.core.valve.plug import recovery
@@ -30,28 +28,54 @@ COARSE_SUB_STEPS = 7  # enough for minutes
 GAS = GAS_CONSTANT * AIR_TEMPERATURE
 MINIMUM_SUPPLY = 1.2e5
 
-STEM = np.dtype(
-    (
-        np.record,
-        [
-            ('tick', np.int64),  # next controller tick, counted from time 0
-            ('y1', np.float64),  # input filter
-            ('y2', np.float64),
-            ('p', np.float64),  # chamber pressure, Pa absolute
-            ('m_a', np.float64),  # air mass, kg
-            ('x', np.float64),  # stem before the play, m
-            ('X', np.float64),  # stem, m
-            ('feedback', np.float64),  # stem after the play of the feedback (f15), m
-        ],
-    )
-)
+
+class StemState(Record):
+    """Remember the stem of the nominal actuator."""
+
+    tick: int  # next controller tick, counted from time 0
+    y1: float  # input filter
+    y2: float
+    p: float  # chamber pressure, Pa absolute
+    m_a: float  # air mass, kg
+    x: float  # stem before the play, m
+    X: float  # stem, m
+    feedback: float  # stem after the play of the feedback (f15), m
+
+
+STEM = StemState.dtype()
 
 STEM_FAULTS = (1, 2, 3, 4, 8, 9, 10, 11, 12, 13, 15, 16)
-FAULTS = np.dtype((np.record, [(f'f{number}', np.float64) for number in range(1, 20)]))
+
+
+class Faults(Record):
+    """Strength of each fault of the benchmark."""
+
+    f1: float
+    f2: float
+    f3: float
+    f4: float
+    f5: float
+    f6: float
+    f7: float
+    f8: float
+    f9: float
+    f10: float
+    f11: float
+    f12: float
+    f13: float
+    f14: float
+    f15: float
+    f16: float
+    f17: float
+    f18: float
+    f19: float
+
+
+FAULTS = Faults.dtype()
 
 
 @jit
-def start_stem(m: Any, act: Valve, t: float) -> None:
+def start_stem(m: StemState, act: Valve, t: float) -> None:
     """Set the rest state at time t, s: chamber empty, so that the spring holds the stem."""
     m.tick = math.ceil(t / act.positioner_period)
     m.y1 = 0.0
@@ -64,7 +88,7 @@ def start_stem(m: Any, act: Valve, t: float) -> None:
 
 
 @jit
-def copy_stem(source: Any, target: Any) -> None:
+def copy_stem(source: StemState, target: StemState) -> None:
     """Copy one stem state into another."""
     target.tick = source.tick
     target.y1 = source.y1
@@ -78,9 +102,9 @@ def copy_stem(source: Any, target: Any) -> None:
 
 @jit
 def advance_stem(
-    m: Any,
+    m: StemState,
     act: Valve,
-    fault: Any,
+    fault: Faults,
     t0: float,
     t1: float,
     cv0: float,

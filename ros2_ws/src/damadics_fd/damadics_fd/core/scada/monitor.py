@@ -5,7 +5,6 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +15,7 @@ from damadics_fd.core.scada.cusum import TEST_NAMES
 from damadics_fd.core.scada.isolation import Isolation, Isolator
 from damadics_fd.core.scada.learning import LearningError, learn
 from damadics_fd.core.scada.settings import ScadaSettings
-from damadics_fd.core.scada.state import MONITOR, REFERENCE
+from damadics_fd.core.scada.state import MONITOR, REFERENCE, MonitorState
 from damadics_fd.core.scada.step import accepts, predict, residuals, step
 
 Floats = NDArray[np.float64]
@@ -30,7 +29,7 @@ TRACE = np.dtype(
         ('alarm', np.bool_),
     ]
 )
-FARTHEST = 10.0  # times 4 MPa: no control valve works above
+FARTHEST = 5.0  # times 4 MPa: no control valve works above
 OUTSIDE = 0.25  # share of full scale a measurement may lie outside its range
 LEARN_AGAIN_S = 60.0
 
@@ -81,7 +80,7 @@ def scada_samples(columns: Mapping[str, NDArray]) -> Floats:
 
 
 @jit
-def usable(sample: np.ndarray, s: Any) -> Any:
+def usable(sample: np.ndarray, s: MonitorState) -> bool:
     """Tell whether a sample may enter: in time order, finite, near its ranges."""
     if not math.isfinite(sample[0]) or (s.samples > 0 and sample[0] <= s.t_raw):
         return False
@@ -249,9 +248,10 @@ class ScadaMonitor:
         return self._record
 
     @property
-    def state(self) -> Any:
+    def state(self) -> MonitorState:
         """Return the record of the compiled step."""
-        return self._state[0]
+        state: MonitorState = self._state[0]
+        return state
 
     def update(
         self,

@@ -15,6 +15,7 @@ UNKNOWN_GAIN = 0.2  # standard error of the stem's gain above which the record s
 GAIN = 0.1  # a positioner's gain may differ from 1 by this
 OFFSET = 0.1
 SIGMAS = 4.0
+UNLIKE = 'this does not look like a valve that works'
 FLOW_GAIN = 0.1
 
 
@@ -39,15 +40,14 @@ def check_stem(fit: StemFit, cv: Floats, x: Floats) -> None:
     slack = max(GAIN, SIGMAS * fit.gain_error)
     if abs(fit.gain - 1.0) > slack:
         raise LearningError(
-            f'this does not look like a valve that works: the stem moves by {fit.gain:.2f} of what '
-            'CV asks (1 expected): stuck, bent feedback or a wrong scale; mend it or check the units'
+            f'{UNLIKE}: the stem moves by {fit.gain:.2f} of what CV asks (1 expected): stuck, '
+            'bent feedback or a wrong scale; mend it or check the units'
         )
-    offset = float(np.median(fit.error + fit.x[:, 0] - fit.x[:, 0]))
-    mean = float(np.median(x - cv))
-    if abs(mean) > OFFSET and abs(offset) + abs(mean) > OFFSET:
+    off = float(np.median(x - cv))
+    if abs(off) > OFFSET:
         raise LearningError(
-            f'this does not look like a valve that works: the stem stands {mean:+.2f} of the stroke '
-            'off its command; mend it or check the scale of X'
+            f'{UNLIKE}: the stem stands {off:+.2f} of the stroke off its command; mend it or '
+            'check the scale of X'
         )
 
 
@@ -61,7 +61,7 @@ def check_flow(ref: Any, settings: ScadaSettings) -> None:
     """
     if settings.kv_stated and ref['flow_kind'] == LAW and abs(float(ref['g1']) - 1.0) > FLOW_GAIN:
         raise LearningError(
-            f'this does not look like the valve described: the flow is {float(ref["g1"]):.2f} of '
+            f'{UNLIKE}: the flow is {float(ref["g1"]):.2f} of '
             f'that of the stated Kv {settings.actuator.kv:g}; mend valve or meter, or state what '
             'the valve is'
         )

@@ -3,7 +3,6 @@
 """Bring pressure filter, stem models and flow law to the time of a sample."""
 
 import math
-from typing import Any
 
 from damadics_fd.core.jit import jit
 from damadics_fd.core.scada.actuator import nominal_flow
@@ -17,7 +16,8 @@ from damadics_fd.core.scada.pressure import (
     predict_pressure,
     push,
 )
-from damadics_fd.core.scada.state import HISTORY_LENGTH, LAW
+from damadics_fd.core.scada.settings import ScadaConfig
+from damadics_fd.core.scada.state import HISTORY_LENGTH, LAW, MonitorState, Reference
 from damadics_fd.core.scada.stem_law import advance_track, position, start_track
 
 SETTLING_PERIODS = 10.0
@@ -27,7 +27,14 @@ GAP_PERIODS = 5.0  # sample periods without a sample that are no gap yet
 
 @jit
 def restart(
-    s: Any, cfg: Any, ref: Any, t: float, cv: float, x: float, p1: float, p2: float
+    s: MonitorState,
+    cfg: ScadaConfig,
+    ref: Reference,
+    t: float,
+    cv: float,
+    x: float,
+    p1: float,
+    p2: float,
 ) -> None:
     """Start the models and the pressure filter at this sample."""
     start_track(s.track, t, cv)
@@ -55,7 +62,7 @@ def restart(
 
 
 @jit
-def count_repeats(s: Any, cv: float, x: float, p1: float, p2: float, flow: float) -> None:
+def count_repeats(s: MonitorState, cv: float, x: float, p1: float, p2: float, flow: float) -> None:
     """Count samples in a row whose values are all those of the sample before."""
     now = (cv, x, p1, p2, flow)
     same = True
@@ -68,7 +75,7 @@ def count_repeats(s: Any, cv: float, x: float, p1: float, p2: float, flow: float
 
 
 @jit
-def repeated(s: Any) -> bool:
+def repeated(s: MonitorState) -> bool:
     """
     Tell whether a sample is a copy of the one before, as historians make where one is late.
 
@@ -78,7 +85,7 @@ def repeated(s: Any) -> bool:
 
 
 @jit
-def settling(cfg: Any, ref: Any) -> float:
+def settling(cfg: ScadaConfig, ref: Reference) -> float:
     """Return how long the models take from a start at the measured position, s."""
     if ref.stem_kind != LAW:
         value: float = cfg.settle_s
@@ -88,8 +95,8 @@ def settling(cfg: Any, ref: Any) -> float:
 
 
 @jit
-def filter_pressures(s: Any, ref: Any, p1: float, p2: float) -> None:
-    """Fuse each pressure with its prediction; a single value far from it is not believed at once."""
+def filter_pressures(s: MonitorState, ref: Reference, p1: float, p2: float) -> None:
+    """Fuse each pressure with its prediction; do not believe a single value far from it."""
     s.innovation[:] = math.nan
     for i in range(2):
         measured = p1 if i == 0 else p2
@@ -101,7 +108,7 @@ def filter_pressures(s: Any, ref: Any, p1: float, p2: float) -> None:
         else:
             predicted = predict_pressure(filt, s.past[i])
             far = abs(measured - predicted) > GATE * filt.sigma
-            if far and s.doubtful[i] == 0 and s.steady > 1:
+            if far and s.doubtful[i] == 0 and s.steady > TAPS:
                 s.doubtful[i] = 1
                 s.p_hat[i] = predicted
                 kept = predicted
@@ -117,9 +124,9 @@ def filter_pressures(s: Any, ref: Any, p1: float, p2: float) -> None:
 
 @jit
 def predict(
-    s: Any,
-    cfg: Any,
-    ref: Any,
+    s: MonitorState,
+    cfg: ScadaConfig,
+    ref: Reference,
     t: float,
     cv: float,
     x: float,
@@ -131,7 +138,7 @@ def predict(
     """
     Bring filter, models and regressors to the sample at t (sheet steps 1, 2, 4).
 
-    :param s: record of `MONITOR`.
+    :param s: record of `MonitorState`.
     :param cfg: record of `SETTINGS`.
     :param ref: record of `REFERENCE`.
     :param t: time, s; the other inputs are scaled to 0..1, NaN for t1, flow where not measured.
@@ -229,7 +236,9 @@ def predict(
 
 
 @jit
-def predict_flow(s: Any, cfg: Any, ref: Any, x: float, t1: float, flow: float) -> None:
+def predict_flow(
+    s: MonitorState, cfg: ScadaConfig, ref: Reference, x: float, t1: float, flow: float
+) -> None:
     """Predict F' from the valve equation, with the sigma that follows from the sensors' noise."""
     s.f = math.nan
     s.f_model = math.nan
@@ -253,7 +262,14 @@ def predict_flow(s: Any, cfg: Any, ref: Any, x: float, t1: float, flow: float) -
 
 @jit
 def predict_by_law(
-    s: Any, ref: Any, x: float, p1: float, p2: float, t1: float, flow: float, dt: float
+    s: MonitorState,
+    ref: Reference,
+    x: float,
+    p1: float,
+    p2: float,
+    t1: float,
+    flow: float,
+    dt: float,
 ) -> None:
     """Predict F' by the flow law; sigma is that of the meter and of what the record left."""
     law = ref.flow_law

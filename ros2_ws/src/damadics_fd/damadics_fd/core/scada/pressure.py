@@ -2,35 +2,36 @@
 # SPDX-License-Identifier: Apache-2.0
 """Learned linear predictors of a pressure: one to filter it by, one to test it against."""
 
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from damadics_fd.core.jit import jit
+from damadics_fd.core.record import Floats, Record
 
 TAPS = 20
 SHORT_TAPS = 12
 SHORT_RECORD = 1000
 GATE = 7.0  # multiples of the predictor's sigma beyond which the measurement is believed
 
-PRESSURE = np.dtype(
-    (
-        np.record,
-        [
-            ('a', np.float64, (TAPS,)),  # predictor, sum a_i = 1
-            ('c', np.float64),  # weight of the measurement
-            ('sigma', np.float64),  # of the prediction error
-            ('mean', np.float64),
-            ('b', np.float64, (TAPS,)),  # predictor of the deviation from the mean
-            ('b0', np.float64),
-        ],
-    )
-)
+
+class PressureFilter(Record):
+    """What a pressure is filtered and tested by."""
+
+    a: Annotated[Floats, TAPS]  # predictor, sum a_i = 1
+    c: float  # weight of the measurement
+    sigma: float  # of the prediction error
+    mean: float
+    b: Annotated[Floats, TAPS]  # predictor of the deviation from the mean
+    b0: float
+
+
+PRESSURE = PressureFilter.dtype()
 
 
 @jit
-def predict_pressure(filt: Any, past: np.ndarray) -> Any:
+def predict_pressure(filt: PressureFilter, past: np.ndarray) -> Any:
     """Return sum a_i P'(k-i); `past` holds the newest raw sample first."""
     total = 0.0
     for i in range(TAPS):
@@ -39,7 +40,7 @@ def predict_pressure(filt: Any, past: np.ndarray) -> Any:
 
 
 @jit
-def innovation(filt: Any, past: np.ndarray, measured: float) -> Any:
+def innovation(filt: PressureFilter, past: np.ndarray, measured: float) -> Any:
     """
     Return P'(k) less its prediction about the learned mean.
 
@@ -52,7 +53,7 @@ def innovation(filt: Any, past: np.ndarray, measured: float) -> Any:
 
 
 @jit
-def fuse_pressure(filt: Any, past: np.ndarray, measured: float) -> Any:
+def fuse_pressure(filt: PressureFilter, past: np.ndarray, measured: float) -> Any:
     """Return P^(k) = c P'(k) + (1-c) pr(k), or P'(k) itself where it jumped."""
     predicted = predict_pressure(filt, past)
     if abs(measured - predicted) > GATE * filt.sigma:

@@ -3,22 +3,23 @@
 """Form the residuals of one sample, less what the models do not know for sure."""
 
 import math
-from typing import Any
 
 from damadics_fd.core.jit import jit
 from damadics_fd.core.scada.cusum import P1, P2, PROCESS, R1, R2, T1
 from damadics_fd.core.scada.flow_law import flow_doubt
 from damadics_fd.core.scada.predict import repeated
-from damadics_fd.core.scada.state import HISTORY_LENGTH, LAW, N_WEIGHTS
+from damadics_fd.core.scada.state import HISTORY_LENGTH, LAW, N_WEIGHTS, MonitorState, Reference
 from damadics_fd.core.scada.stem_law import outside, stem_doubt, transient_doubt
 
 DOUBT = 3.0  # standard deviations of a law that are no evidence
+X = 2  # place of the position among the signals
+NEAR = 0.01  # of the stroke, still where it was learned
 STOP = 0.015  # this near to an end of the stroke the stem is at its stop
 STOP_DOUBT = 0.05  # of the stroke, at a stop and for a while after it has left
 STOP_S = 60.0
 # What a quarter of an hour does not show and a day does: how a plant changes over hours.
 HOURS_S = 10800.0
-STEM_HOURS = 0.0025  # standard deviation, share of stroke
+STEM_HOURS = 0.002  # standard deviation, share of stroke
 FLOW_HOURS = 0.05  # share of the flow
 END = 0.985  # of the meter's range: it shows no more
 LEAST = 0.03  # of the meter's range: it shows no less
@@ -29,7 +30,7 @@ MOVED = 0.03  # a flow that moved by this share explains a pressure
 
 
 @jit
-def hours_unseen(ref: Any) -> float:
+def hours_unseen(ref: Reference) -> float:
     """Return which part of the slow changes of a plant the record was too short to show, 0..1."""
     value: float = math.sqrt(HOURS_S / (HOURS_S + ref.seconds))
     return value
@@ -47,9 +48,12 @@ def shrink(value: float, allowance: float) -> float:
 
 
 @jit
-def residuals(s: Any, ref: Any, x: float, p1: float, p2: float, t1: float, flow: float) -> None:
+def residuals(
+    s: MonitorState, ref: Reference, x: float, p1: float, p2: float, t1: float, flow: float
+) -> None:
     """Form r1 = X' - model, r2 = (F' - flow law) / sigma and what the inputs show."""
     s.testable[:] = 1
+    s.inside = 1 if ref.low[X] - NEAR <= s.xm[0] <= ref.high[X] + NEAR else 0
     entry = s.history[(s.samples - 1) % HISTORY_LENGTH]
     correction = 0.0
     xm = s.xm[0]
@@ -92,7 +96,7 @@ def lever(at: float, mean: float, sd: float) -> float:
 
 
 @jit
-def flow_residual(s: Any, ref: Any, x: float, flow: float) -> float:
+def flow_residual(s: MonitorState, ref: Reference, x: float, flow: float) -> float:
     """Return r2 in sigma; 0 and not testable where meter or law say nothing."""
     s.lever[1] = 1.0
     if ref.flow_kind != LAW:
@@ -131,12 +135,12 @@ def flow_residual(s: Any, ref: Any, x: float, flow: float) -> float:
 
 
 @jit
-def process_residual(s: Any, ref: Any, p1: float, p2: float, flow: float) -> float:
+def process_residual(s: MonitorState, ref: Reference, p1: float, p2: float, flow: float) -> float:
     """
     Return 1 where a pressure left its level so far and so fast that no load change explains it.
 
-    A load change moves pressures and flow together: more flow takes the inlet pressure down and the
-    outlet pressure up. A pressure that moves against the flow, or without it, is the plant's own.
+    A load change moves pressures and flow together: more flow takes the inlet pressure down and
+    the outlet pressure up. A pressure that moves against the flow, or without it, is not that.
     """
     if not ref.drop > 0.0 or math.isnan(p1) or math.isnan(p2):
         s.testable[PROCESS] = 0

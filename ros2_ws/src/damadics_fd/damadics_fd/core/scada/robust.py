@@ -16,8 +16,8 @@ def spread_of(values: Floats) -> float:
     """
     Return a standard deviation by the median absolute deviation; NaN are left out.
 
-    :param values: any shape; where more than half of them are equal, as with compressed records, the
-        middle 90 % tell.
+    :param values: any shape; where most of them are equal, as in compressed records, the middle
+        90 % tell.
     """
     v = values[np.isfinite(values)]
     if not v.size:

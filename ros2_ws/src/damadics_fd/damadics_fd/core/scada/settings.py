@@ -3,6 +3,7 @@
 """Settings of the SCADA-rate monitor."""
 
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 
@@ -73,17 +74,29 @@ class ScadaSettings:
         return values
 
 
+class ScadaConfig(Protocol):
+    """What the compiled step reads of the settings."""
+
+    act: Valve
+    period_s: float
+    t_on_s: float
+    sigma: float
+    wide_play: float
+    gap_s: float
+    settle_s: float
+    flow_high: float
+    model_high: float
+
+
 SETTINGS = np.dtype(
     (
         np.record,
         [
             ('act', Valve().record().dtype),
-            ('period_s', np.float64),
-            ('t_on_s', np.float64),
-            ('sigma', np.float64),
-            ('wide_play', np.float64),
-            ('gap_s', np.float64),
-            ('settle_s', np.float64),
+            *(
+                (name, np.float64)
+                for name in ('period_s', 't_on_s', 'sigma', 'wide_play', 'gap_s', 'settle_s')
+            ),
             ('flow_high', np.float64),
             ('model_high', np.float64),
         ],

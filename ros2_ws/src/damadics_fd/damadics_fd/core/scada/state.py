@@ -2,13 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the SCADA-rate monitor keeps: the learned reference, the state, the last samples."""
 
-import numpy as np
+from typing import Annotated
 
+from damadics_fd.core.record import Floats, Ints, Record, Rows
 from damadics_fd.core.scada.cusum import TESTS
-from damadics_fd.core.scada.model import FAULTS, STEM
-from damadics_fd.core.scada.flow_law import FLOW_LAW
-from damadics_fd.core.scada.pressure import PRESSURE, TAPS
-from damadics_fd.core.scada.stem_law import STEM_LAW, STEM_TRACK
+from damadics_fd.core.scada.flow_law import FlowLaw
+from damadics_fd.core.scada.model import Faults, StemState
+from damadics_fd.core.scada.pressure import TAPS, PressureFilter
+from damadics_fd.core.scada.stem_law import StemLaw, StemTrack
 
 N_TESTS = len(TESTS)
 N_WEIGHTS = 11
@@ -17,148 +18,144 @@ HISTORY_LENGTH = 1536
 N_RESIDUALS = 6
 NOMINAL, LAW = range(2)  # where stem and flow come from: the stated actuator, what was identified
 
-HISTORY = np.dtype(
-    (
-        np.record,
-        [
-            (name, np.float64)
-            for name in (
-                't0',
-                't',
-                'cv0',
-                'cv',
-                'dp0',
-                'dp',
-                'slope0',
-                'slope',
-                'x',
-                'p1',
-                'p2',
-                't1',
-                'flow',
-                'correction',
-                'f',
-                'sq',
-                'r1',
-                'r2',
-                'xm',
-            )
-        ]
-        + [('stem', STEM), ('masked', np.bool_)],
-    )
-)
 
-REFERENCE = np.dtype(
-    (
-        np.record,
-        [
-            ('stem_kind', np.int64),  # NOMINAL or LAW
-            ('flow_kind', np.int64),
-            ('stem_law', STEM_LAW),
-            ('flow_law', FLOW_LAW),
-            ('period', np.float64),  # of the samples learned from, s
-            ('signals', np.int64),  # bit i: signal i of the samples was measured
-            ('low', np.float64, (7,)),  # learned range of each signal
-            ('high', np.float64, (7,)),
-            ('seconds', np.float64),  # how long the record was
-            ('drop', np.float64),  # P1 - P2
-            ('flow_max', np.float64),
-            ('swing', np.float64, (2,)),  # change of P1, P2 that no load change explains
-            ('x_mean', np.float64),  # of the model, where r1 was learned
-            ('x_sd', np.float64),
-            ('f_mean', np.float64),  # of the flow, where r2 was learned
-            ('f_sd', np.float64),
-            ('se', np.float64, (N_TESTS,)),  # allowance that grows with the distance from there
-            ('pressure', PRESSURE, (2,)),
-            ('hold', np.bool_),  # CV is held between samples
-            ('cv_jump', np.float64),  # change of CV between two samples that was not learned
-            ('w', np.float64, (N_WEIGHTS,)),
-            ('dp_mean', np.float64),
-            ('g0', np.float64),
-            ('g1', np.float64),
-            ('mu', np.float64, (N_TESTS,)),
-            ('sd', np.float64, (N_TESTS,)),
-            ('k', np.float64, (N_TESTS,)),
-            ('h', np.float64, (N_TESTS,)),
-            ('clip', np.float64, (N_TESTS,)),
-            ('s1', np.float64),
-            ('kap2', np.float64),
-            ('llr_limit', np.float64),
-            ('n', np.int64),
-        ],
-    )
-)
+class History(Record):
+    """Remember one sample, for the isolation."""
 
-MONITOR = np.dtype(
-    (
-        np.record,
-        [
-            ('samples', np.int64),
-            ('t_first', np.float64),
-            ('t', np.float64),
-            ('t_raw', np.float64),  # last sample seen, accepted or thinned out
-            ('t_test', np.float64),  # no test before
-            ('t_stem', np.float64),  # no test of r1 before
-            ('filled', np.int64),  # pressure samples since the last restart
-            ('past', np.float64, (2, TAPS)),
-            ('p_hat', np.float64, (2,)),
-            ('steady', np.int64),  # samples in a row at the period
-            ('innovation', np.float64, (2,)),  # of P1, P2; NaN until as many as taps are steady
-            ('stem', STEM, (2,)),  # nominal, wide play
-            ('track', STEM_TRACK),
-            ('xs', np.float64),  # slow copy of the stem law
-            ('last', np.float64, (5,)),  # CV, X, P1, P2, F of the sample before
-            ('repeats', np.int64),  # samples in a row that are the one before
-            ('size', np.float64),
-            ('f_lagged', np.float64),
-            ('flat', np.int64),  # samples in a row with the same flow
-            ('last_flow', np.float64),
-            ('level', np.float64, (2,)),  # where P1, P2 have been lately
-            ('level_before', np.float64, (2,)),  # the same before the present occurrence
-            ('level_flow', np.float64),
-            ('t_stop', np.float64),  # the stem was at an end until then
-            ('testable', np.uint8, (N_RESIDUALS,)),
-            ('stands', np.uint8, (N_RESIDUALS,)),  # a fault seen in it and not seen to be gone
-            ('good', np.int64, (N_RESIDUALS,)),  # testable samples in a row without evidence
-            ('travel', np.float64),  # of the model since the last evidence in r1
-            ('lever', np.float64, (2,)),
-            ('saved', np.float64, (N_TESTS, 2)),  # statistics before a jump that may be a spike
-            ('jumped', np.uint8, (N_RESIDUALS,)),
-            ('spikes', np.int64, (N_RESIDUALS,)),
-            ('doubtful', np.uint8, (2,)),  # the last P1, P2 was not believed
-            ('occurrence', np.int64),
-            ('t_raised', np.float64),  # of the present occurrence; t_alarm is the first one's
-            ('stood', np.bool_),
-            ('recovery', np.int64),  # samples without evidence after which a fault has gone
-            ('t_gone', np.float64),
-            ('t_shown', np.float64, (N_RESIDUALS,)),  # when each residual showed it first; NaN: not yet
-            ('sign', np.float64, (N_RESIDUALS,)),  # and which way
-            ('t_evidence', np.float64),  # last sample with evidence of it
-            ('fault', FAULTS, (2,)),
-            ('cv', np.float64, (4,)),
-            ('dp', np.float64, (2,)),  # z(k), z(k-1)
-            ('xm', np.float64, (3,)),
-            ('xd', np.float64),
-            ('phi', np.float64, (N_WEIGHTS,)),
-            ('f', np.float64),
-            ('f_model', np.float64),  # the same with the model's position
-            ('sq', np.float64),
-            ('masked', np.bool_),
-            ('residual', np.float64, (N_RESIDUALS,)),
-            ('g', np.float64, (N_TESTS, 2)),
-            ('zero', np.float64, (N_TESTS, 2)),  # when g was last zero: estimate of the onset
-            ('llr', np.float64),
-            ('llr_zero', np.float64),
-            ('ratio', np.float64),  # largest statistic / limit
-            ('worst', np.int64),
-            ('alarm', np.bool_),
-            ('t_alarm', np.float64),
-            ('t_onset', np.float64),
-            ('test', np.int64),
-            ('beyond', np.uint8, (N_TESTS,)),  # this sample speaks for a fault
-            ('ratios', np.float64, (N_TESTS + 1,)),
-            ('peaks', np.float64, (N_TESTS + 1,)),  # largest of the ratios so far
-            ('history', HISTORY, (HISTORY_LENGTH,)),
-        ],
-    )
-)
+    t0: float
+    t: float
+    cv0: float
+    cv: float
+    dp0: float
+    dp: float
+    slope0: float
+    slope: float
+    x: float
+    p1: float
+    p2: float
+    t1: float
+    flow: float
+    correction: float
+    f: float
+    sq: float
+    r1: float
+    r2: float
+    xm: float
+    stem: StemState
+    masked: bool
+
+
+class Reference(Record):
+    """What was learned of a valve from fault-free records."""
+
+    stem_kind: int  # NOMINAL or LAW
+    flow_kind: int
+    stem_law: StemLaw
+    flow_law: FlowLaw
+    period: float  # of the samples learned from, s
+    signals: int  # bit i: signal i of the samples was measured
+    low: Annotated[Floats, 7]  # learned range of each signal
+    high: Annotated[Floats, 7]
+    seconds: float  # how long the record was
+    drop: float  # P1 - P2
+    flow_max: float
+    swing: Annotated[Floats, 2]  # change of P1, P2 that no load change explains
+    x_mean: float  # of the model, where r1 was learned
+    x_sd: float
+    f_mean: float  # of the flow, where r2 was learned
+    f_sd: float
+    se: Annotated[Floats, N_TESTS]  # allowance that grows with the distance from there
+    pressure: Annotated[Rows[PressureFilter], 2]
+    hold: bool  # CV is held between samples
+    cv_jump: float  # change of CV between two samples that was not learned
+    w: Annotated[Floats, N_WEIGHTS]
+    dp_mean: float
+    g0: float
+    g1: float
+    mu: Annotated[Floats, N_TESTS]
+    sd: Annotated[Floats, N_TESTS]
+    k: Annotated[Floats, N_TESTS]
+    h: Annotated[Floats, N_TESTS]
+    clip: Annotated[Floats, N_TESTS]
+    s1: float
+    kap2: float
+    llr_limit: float
+    n: int
+
+
+REFERENCE = Reference.dtype()
+
+
+class MonitorState(Record):
+    """Remember one valve between two samples."""
+
+    samples: int
+    t_first: float
+    t: float
+    t_raw: float  # last sample seen, accepted or thinned out
+    t_test: float  # no test before
+    t_stem: float  # no test of r1 before
+    filled: int  # pressure samples since the last restart
+    past: Annotated[Floats, 2, TAPS]
+    p_hat: Annotated[Floats, 2]
+    steady: int  # samples in a row at the period
+    innovation: Annotated[Floats, 2]  # of P1, P2; NaN until as many as taps are steady
+    stem: Annotated[Rows[StemState], 2]  # nominal, wide play
+    track: StemTrack
+    xs: float  # slow copy of the stem law
+    last: Annotated[Floats, 5]  # CV, X, P1, P2, F of the sample before
+    repeats: int  # samples in a row that are the one before
+    size: float
+    f_lagged: float
+    flat: int  # samples in a row with the same flow
+    last_flow: float
+    level: Annotated[Floats, 2]  # where P1, P2 have been lately
+    level_before: Annotated[Floats, 2]  # the same before the present occurrence
+    level_flow: float
+    t_stop: float  # the stem was at an end until then
+    testable: Annotated[Ints, N_RESIDUALS]
+    stands: Annotated[Ints, N_RESIDUALS]  # a fault seen in it and not seen to be gone
+    good: Annotated[Ints, N_RESIDUALS]  # testable samples in a row without evidence
+    inside: int  # the stem is where it was learned
+    travel: float  # of the model since the last evidence in r1
+    lever: Annotated[Floats, 2]
+    saved: Annotated[Floats, N_TESTS, 2]  # statistics before a jump that may be a spike
+    jumped: Annotated[Ints, N_RESIDUALS]
+    spikes: Annotated[Ints, N_RESIDUALS]
+    doubtful: Annotated[Ints, 2]  # the last P1, P2 was not believed
+    occurrence: int
+    t_raised: float  # of the present occurrence; t_alarm is the first one's
+    stood: bool
+    recovery: int  # samples without evidence after which a fault has gone
+    t_gone: float
+    t_shown: Annotated[Floats, N_RESIDUALS]  # when each residual showed it first; NaN: not yet
+    sign: Annotated[Floats, N_RESIDUALS]  # and which way
+    t_evidence: float  # last sample with evidence of it
+    fault: Annotated[Rows[Faults], 2]
+    cv: Annotated[Floats, 4]
+    dp: Annotated[Floats, 2]  # z(k), z(k-1)
+    xm: Annotated[Floats, 3]
+    xd: float
+    phi: Annotated[Floats, N_WEIGHTS]
+    f: float
+    f_model: float  # the same with the model's position
+    sq: float
+    masked: bool
+    residual: Annotated[Floats, N_RESIDUALS]
+    g: Annotated[Floats, N_TESTS, 2]
+    zero: Annotated[Floats, N_TESTS, 2]  # when g was last zero: estimate of the onset
+    llr: float
+    llr_zero: float
+    ratio: float  # largest statistic / limit
+    worst: int
+    alarm: bool
+    t_alarm: float
+    t_onset: float
+    test: int
+    beyond: Annotated[Ints, N_TESTS]  # this sample speaks for a fault
+    ratios: Annotated[Floats, N_TESTS + 1]
+    peaks: Annotated[Floats, N_TESTS + 1]  # largest of the ratios so far
+    history: Annotated[Rows[History], HISTORY_LENGTH]
+
+
+MONITOR = MonitorState.dtype()

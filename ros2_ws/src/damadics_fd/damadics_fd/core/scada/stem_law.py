@@ -4,62 +4,63 @@
 A stem as anyone's positioner moves it: dead time, first-order lag, rate limits, dead band.
 
 The law runs on CV alone and never looks at the measured position, so a stem that stands still or
-is off by a little shows for as long as it lasts. A second copy moves no faster than the law has been
+is off by a little shows for as long as it lasts. A second copy moves no faster than the law was
 seen to move while it was right: between the two lies what was not learned, and a stem that is
 found there is no evidence against the valve.
 """
 
 import math
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from damadics_fd.core.jit import jit
+from damadics_fd.core.record import Floats, Record
 
 DELAYS = 64  # samples of CV kept for the dead time
 FADE_LAGS, FADE_S = 3.0, 5.0  # how long a motion is remembered
-TRANSIENT = 0.1  # of the way still to go that a law knows no better
+TRANSIENT = 0.08  # of the way still to go that a law knows no better
 FAST = 1e3  # a rate that limits nothing, 1/s
 
-STEM_LAW = np.dtype(
-    (
-        np.record,
-        [
-            ('dead_s', np.float64),  # dead time of CV
-            ('lag_s', np.float64),  # first-order lag
-            ('rise', np.float64),  # fastest closing, stroke/s
-            ('fall', np.float64),  # fastest opening
-            ('slow_rise', np.float64),  # fastest closing at which the law was seen to hold
-            ('slow_fall', np.float64),
-            ('transient', np.float64),  # doubt while it moves, share of the way still to go
-            ('band', np.float64),  # dead band, share of stroke
-            ('gain', np.float64),
-            ('offset', np.float64),
-            ('centre', np.float64),  # mean position learned at
-            ('v_offset', np.float64),  # variances of offset and gain
-            ('v_gain', np.float64),
-        ],
-    )
-)
 
-STEM_TRACK = np.dtype(
-    (
-        np.record,
-        [
-            ('count', np.int64),
-            ('t', np.float64, (DELAYS,)),
-            ('cv', np.float64, (DELAYS,)),
-            ('ahead', np.float64),  # how far the law has still to go
-            ('was_ahead', np.float64),  # the same, or a little while ago
-            ('lagged', np.float64, (2,)),  # after lag and rate: the law, its slow copy
-            ('held', np.float64, (2,)),  # after the dead band
-        ],
-    )
-)
+class StemLaw(Record):
+    """What is known of a stem: how it follows CV, how far that was seen to hold."""
+
+    dead_s: float  # dead time of CV
+    lag_s: float  # first-order lag
+    rise: float  # fastest closing, stroke/s
+    fall: float  # fastest opening
+    slow_rise: float  # fastest closing at which the law was seen to hold
+    slow_fall: float
+    transient: float  # doubt while it moves, share of the way still to go
+    band: float  # dead band, share of stroke
+    gain: float
+    offset: float
+    centre: float  # mean position learned at
+    v_offset: float  # variances of offset and gain
+    v_gain: float
+
+
+STEM_LAW = StemLaw.dtype()
+
+
+class StemTrack(Record):
+    """Remember CV for the dead time, and where law and slow copy are."""
+
+    count: int
+    t: Annotated[Floats, DELAYS]
+    cv: Annotated[Floats, DELAYS]
+    ahead: float  # how far the law has still to go
+    was_ahead: float  # the same, or a little while ago
+    lagged: Annotated[Floats, 2]  # after lag and rate: the law, its slow copy
+    held: Annotated[Floats, 2]  # after the dead band
+
+
+STEM_TRACK = StemTrack.dtype()
 
 
 @jit
-def start_track(s: Any, t: float, cv: float) -> None:
+def start_track(s: StemTrack, t: float, cv: float) -> None:
     """Start at rest where CV is."""
     s.count = 0
     s.t[:] = t
@@ -71,7 +72,7 @@ def start_track(s: Any, t: float, cv: float) -> None:
 
 
 @jit
-def delayed(s: Any, time: float) -> Any:
+def delayed(s: StemTrack, time: float) -> Any:
     """Return CV at a time, by straight lines between the samples that are kept."""
     newest = s.count % DELAYS
     for back in range(DELAYS - 1):
@@ -87,7 +88,7 @@ def delayed(s: Any, time: float) -> Any:
 
 
 @jit
-def advance_track(s: Any, law: Any, t: float, cv: float) -> None:
+def advance_track(s: StemTrack, law: StemLaw, t: float, cv: float) -> None:
     """
     Take CV at t; `position` then tells where the stem should be.
 
@@ -118,7 +119,7 @@ def advance_track(s: Any, law: Any, t: float, cv: float) -> None:
 
 
 @jit
-def position(s: Any, law: Any, k: int) -> float:
+def position(s: StemTrack, law: StemLaw, k: int) -> float:
     """Return the position of the law (0) or of its slow copy (1), 0..1."""
     x: float = law.offset + law.gain * s.held[k]
     return min(max(x, 0.0), 1.0)
@@ -138,14 +139,14 @@ def outside(x: float, first: float, second: float) -> float:
 
 
 @jit
-def stem_doubt(law: Any, x: float) -> float:
+def stem_doubt(law: StemLaw, x: float) -> float:
     """Return the standard deviation of the law's mean at x: small where it was learned."""
     away = x - law.centre
     return math.sqrt(law.v_offset + law.v_gain * away * away)
 
 
 @jit
-def transient_doubt(s: Any, law: Any) -> float:
+def transient_doubt(s: StemTrack, law: StemLaw) -> float:
     """Return by how much the law may be wrong because it moves, or moved a little while ago."""
     value: float = TRANSIENT * s.ahead + (law.transient - TRANSIENT) * s.was_ahead
     return value
@@ -155,8 +156,11 @@ def transient_doubt(s: Any, law: Any) -> float:
 def follow_record(
     law: np.ndarray, track: np.ndarray, t: np.ndarray, cv: np.ndarray, out: np.ndarray
 ) -> None:
-    """Run the law and its slow copy over a record; `out` gets shape (n, 3): both with gain 1
-    and offset 0, and the way still to go."""
+    """
+    Run the law and its slow copy over a record.
+
+    :param out: written, shape (n, 3): both with gain 1 and offset 0, and the way still to go.
+    """
     s = track[0]
     p = law[0]
     start_track(s, t[0], cv[0])

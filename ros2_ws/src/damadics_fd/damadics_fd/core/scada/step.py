@@ -2,16 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """The compiled step of the SCADA-rate monitor: one sample into two residuals and the tests."""
 
-from typing import Any
-
 from damadics_fd.core.jit import jit
 from damadics_fd.core.scada.decide import decide
 from damadics_fd.core.scada.predict import predict
 from damadics_fd.core.scada.residuals import residuals
+from damadics_fd.core.scada.settings import ScadaConfig
+from damadics_fd.core.scada.state import MonitorState, Reference
 
 
 @jit
-def accepts(s: Any, cfg: Any, t: float) -> bool:
+def accepts(s: MonitorState, cfg: ScadaConfig, t: float) -> bool:
     """Tell whether a sample at t is due, thinning faster input to the monitor's period."""
     interval = t - s.t_raw
     s.t_raw = t
@@ -21,9 +21,9 @@ def accepts(s: Any, cfg: Any, t: float) -> bool:
 
 @jit
 def step(
-    s: Any,
-    cfg: Any,
-    ref: Any,
+    s: MonitorState,
+    cfg: ScadaConfig,
+    ref: Reference,
     t: float,
     cv: float,
     x: float,

@@ -1,10 +1,11 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
 """
-Name the fault of a valve whose actuator is not known: which residuals show it, which way, in which
-order, and what the process does meanwhile.
+Name the fault of a valve whose actuator is not known, by witnesses.
 
-- A pressure that moves against the flow, before anything else does: the pressures themselves (f17).
+Which residuals show it, which way, in which order, and what the process does meanwhile:
+
+- A pressure that moves against the flow, before anything else does: the pressures (f17).
 - The flow too high for position and pressures, the stem as commanded: a bypass (f18) or the meter
   (f19). A bypass takes pressure off the valve, a meter does not, at first.
 - The stem away from its command while the flow follows the stem: actuator or positioner. Without
