@@ -82,7 +82,6 @@ FAULTS = {
     'bias 2 %': lambda x, d: x + 0.02,
     'gain 0.9': lambda x, d: 0.9 * x,
     'stuck': lambda x, d: np.full_like(x, x[0]),
-    'drift 5 % in 600 s': lambda x, d: x + 0.05 * np.clip(d / 600, 0, 1),
 }
 
 
@@ -99,8 +98,6 @@ def test_injected_faults_are_found_before_the_fir_baseline(lublin, name):
     baseline.fit(lublin[:900])
     hits = np.flatnonzero(baseline.statistic(faulty) >= 12.0)
     theirs = faulty[hits[0], T] - since if hits.size else math.inf
-    if not hits.size and name.startswith('drift'):
-        return  # 2 % after five minutes: within what this plant does by itself
     assert monitor.state.alarm
     assert 0.0 <= monitor.state.t_alarm - since <= theirs
 

@@ -122,12 +122,12 @@ def fit_flow(
     good &= x < 1.0 - 0.5 * STEP
     if good.sum() < 100:
         return None
-    best = None
-    for lag in LAGS:
-        fit = _fit(t, x, model_x, size, flow, good, lag)
-        if best is None or fit[0] < BETTER * best[0]:
-            best = (*fit, lag)
-    _, c, v, left, spread, lag = best
+    lag = LAGS[0]
+    error, c, v, left, spread = _fit(t, x, model_x, size, flow, good, lag)
+    for longer in LAGS[1:]:
+        fit = _fit(t, x, model_x, size, flow, good, longer)
+        if fit[0] < BETTER * error:
+            lag, (error, c, v, left, spread) = longer, fit
     law = np.zeros(1, FLOW_LAW)
     law['medium'], law['c'], law['lag_s'], law['range'] = medium, c, lag, flow_range
     law['size0'] = float(np.mean(size[good]))

@@ -171,7 +171,8 @@ def _finish(law: NDArray, pieces: Sequence[Piece], x: Floats) -> StemFit:
     free = np.zeros(2)
     for _ in range(10):
         normal = design.T @ (design * weight[:, None])
-        free = np.linalg.lstsq(normal, design.T @ (weight * target), rcond=None)[0]
+        right = design.T @ (weight * target)
+        free = np.asarray(np.linalg.lstsq(normal, right, rcond=None)[0], np.float64)
         left = target - design @ free
         weight = huber_weights(left)
     sigma = max(spread_of(left), 1e-5)

@@ -16,6 +16,7 @@ from damadics_fd.core.scada.fit_flow import FlowFit, better_medium
 from damadics_fd.core.scada.fit_stem import Piece, StemFit, fit_stem
 from damadics_fd.core.scada.limits import friction_limit, is_stationary, set_limits
 from damadics_fd.core.scada.plausible import LearningError, check_flow, check_stem
+from damadics_fd.core.scada.predict import predict
 from damadics_fd.core.scada.pressure import learn_pressure
 from damadics_fd.core.scada.residuals import residuals
 from damadics_fd.core.scada.robust import Floats, huber_weights, loss_of, spread_of
@@ -29,7 +30,6 @@ from damadics_fd.core.scada.state import (
     NOMINAL,
     REFERENCE,
 )
-from damadics_fd.core.scada.step import predict
 
 RIDGE = 1e-4
 EARNED = 0.9  # the further regressors must cut the variance of the second half to this share
@@ -317,7 +317,8 @@ def _stated_flow(ref: Any, prediction: Prediction, flow: Floats) -> bool:
     left = y
     for _ in range(4):
         z = np.column_stack([one, instrument]) * weight[:, None]
-        g = np.linalg.lstsq(z.T @ np.column_stack([one, f]), z.T @ y, rcond=None)[0]
+        normal = z.T @ np.column_stack([one, f])
+        g = np.asarray(np.linalg.lstsq(normal, z.T @ y, rcond=None)[0], np.float64)
         left = (y - g[0] - g[1] * f) / sq
         weight = np.minimum(1.0, 2.0 * huber_weights(left)) / sq**2
     ref['g0'], ref['g1'] = g

@@ -14,9 +14,11 @@ from damadics_fd.core.scada.actuator import F_RANGE, P_RANGE, T_RANGE, TPH_PER_K
 from damadics_fd.core.scada.cusum import TEST_NAMES
 from damadics_fd.core.scada.isolation import Isolation, Isolator
 from damadics_fd.core.scada.learning import LearningError, learn
+from damadics_fd.core.scada.predict import predict
+from damadics_fd.core.scada.residuals import residuals
 from damadics_fd.core.scada.settings import ScadaSettings
 from damadics_fd.core.scada.state import MONITOR, REFERENCE, MonitorState
-from damadics_fd.core.scada.step import accepts, predict, residuals, step
+from damadics_fd.core.scada.step import accepts, step
 
 Floats = NDArray[np.float64]
 TRACE = np.dtype(
