@@ -218,6 +218,7 @@ class DetectorNode(MonitoringNode):
             'Fault': decision.fault,
             'Residual (1/s)': decision.residual,
             'Threshold (1/s)': decision.threshold,
+            'Ratio': decision.residual / decision.threshold if decision.threshold else 0.0,
             'Faults since the start': decision.occurrence,
             'Acknowledged': decision.acknowledged,
             'Near misses': statistics['near_misses'],

@@ -122,6 +122,7 @@ class SignaturePublisher:
         unreadable = self._trend.unreadable if self._trend else 0
         return {
             'Cause': view.cause.replace('_', ' '),
+            'Fault code': f'VALVE_{view.cause.upper()}',  # one fault per cause for fault managers
             **({'Lines of the trend unreadable': str(unreadable)} if unreadable else {}),
             **{f'Trend of {o.quantity}': o.sentence() for o in self._outlook},
         }
