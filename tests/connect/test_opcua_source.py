@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import yaml
 from conftest import Peer
+from connect.certificates import make_certificate
 from connect.servers import Server
 from damadics_bringup.processes import executable
 from damadics_fd.ros import qos
@@ -252,3 +253,21 @@ def test_browse_proposes_a_configuration_that_runs(connect, serve, domain, tmp_p
     assert done.returncode == 0, done.stderr
     c = connect(yaml.safe_load(done.stdout))
     assert c.wait(lambda: len(c.samples['lv1']) > 2), c.log()
+
+
+def test_an_encrypted_channel_and_a_server_that_is_another_one(connect, serve, tmp_path):
+    for name, uri in (('server', 'urn:freeopcua:python:server'), ('own', 'urn:damadics:connect')):
+        make_certificate(tmp_path, name, uri)
+    make_certificate(tmp_path, 'another', 'urn:freeopcua:python:server')
+    server = serve(1, '--certificates', tmp_path)
+    security = {'certificate': 'own.der', 'key': 'own.pem', 'server_certificate': 'server.der'}
+    config = {'server': url(server), 'valves': {'lv0': valve(0)}, 'period': 0.5}
+    c = connect({**config, 'security': security})
+    assert c.wait(lambda: len(c.samples['lv0']) > 2, 40.0), c.log()
+    c.processes.end('opcua')
+    c = connect({**config, 'security': {**security, 'server_certificate': 'another.der'}})
+    assert c.wait(lambda: 'not connected' in c.log(), 40.0)
+    assert not c.samples['lv0'] and 'Traceback' not in c.log()
+    c.processes.end('opcua')
+    c = connect({**config, 'security': {**security, 'key': 'server.der'}})
+    assert c.wait(lambda: 'certificate or key cannot be used' in c.log(), 40.0), c.log()
