@@ -25,7 +25,6 @@ ORDER = {  # a package knows only those of a lower floor
     'damadics_bringup': 5,
 }
 DISTRIBUTIONS = {
-    'fpdf': 'fpdf2',
     'sklearn': 'scikit-learn',
     'distributed': 'dask',
     'yaml': 'pyyaml',
