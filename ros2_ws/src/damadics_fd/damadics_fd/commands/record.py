@@ -76,6 +76,7 @@ def main(args: list[str] | None = None) -> int:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda signum, frame: stop.append(signum))
     rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+    node: Recorder | None = None
     try:
         bag = _bag(options)
         spool = Spool(bag, rotate=options.quota_mb > 0)
@@ -88,6 +89,8 @@ def main(args: list[str] | None = None) -> int:
         print(f'recorder: {error}', file=sys.stderr)
         return 1
     finally:
+        if node:
+            node.destroy_node()
         rclpy.try_shutdown()
     lost = ''.join(
         f', {count} {what}'

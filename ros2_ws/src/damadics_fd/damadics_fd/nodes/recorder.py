@@ -5,6 +5,7 @@
 import importlib
 import inspect
 import shutil
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -21,9 +22,13 @@ from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.rosbag2 import Topic
 from damadics_fd.bag.spool import Spool
 from damadics_fd.nodes.loss_count import Sequence
+from damadics_fd.ros.graph_events import GraphEvents
 
 DEPTH = 100_000  # messages that may wait in the middleware while this process is held up
-LOOK_PERIOD = 0.1  # [s] between two looks at the graph
+LOOK_PERIOD = 0.1  # [s] from a change of the graph to a look at it, at most
+LOOK_SHARE = 0.1  # of the time that looks may take while the graph keeps changing
+BLIND_PERIOD = 1.0  # [s] between two looks where the middleware tells of no changes
+MOST_SHOWN = 50  # topics counted one by one in /diagnostics
 OWN_TOPICS = {  # subscribed before they have a publisher, so that nothing of them is missed
     'measurement': ('damadics_msgs/msg/Measurement', False),
     'fault_state': ('damadics_msgs/msg/FaultState', False),
@@ -92,8 +97,16 @@ class Recorder(Node):
             if not self._wanted or full in self._wanted:
                 self._record(full, kind, True, latched)
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        self._changed = threading.Event()
+        self._looked = 0.0  # [s] monotonic time of the last look, and what it took
+        self._look_took = 0.0
+        self._graph: GraphEvents | None = None
+        try:
+            self._graph = GraphEvents(self, self._changed.set)
+        except OSError as error:
+            self.get_logger().warning(f'asking for topics once a second: {error}')
         self.look()
-        self.create_timer(LOOK_PERIOD, self.look)
+        self.create_timer(LOOK_PERIOD, self._look_if_changed)
         self.create_timer(1.0, self._report)
 
     @property
@@ -105,6 +118,24 @@ class Recorder(Node):
     def wanted(self) -> set[str]:
         """Names of the topics that were asked for, none where it is all."""
         return self._wanted
+
+    def _look_if_changed(self) -> None:
+        """Look where the graph has changed; less often the longer a look takes."""
+        since = time.monotonic() - self._looked
+        due = self._changed.is_set() if self._graph else since >= BLIND_PERIOD
+        if due and since * LOOK_SHARE >= self._look_took:
+            self._changed.clear()
+            began = time.monotonic()
+            self.look()
+            self._looked = time.monotonic()
+            self._look_took = self._looked - began
+
+    def destroy_node(self) -> None:
+        """Stop watching the graph, and let go of everything."""
+        if self._graph:
+            self._graph.close()
+            self._graph = None
+        super().destroy_node()
 
     def look(self) -> None:
         """Subscribe to topics that have appeared, as their publishers offer them; count losses."""
@@ -137,10 +168,10 @@ class Recorder(Node):
         self.get_logger().error(f'cannot record {name}: {reason}')
 
     def _record(self, name: str, kind: str, reliable: bool, latched: bool) -> None:
-        package, folder, short = kind.split('/')
         try:
+            topic = self._spool.bag.add_topic(name, kind)  # refuses what is no installed message
+            package, folder, short = kind.split('/')
             message_type = getattr(importlib.import_module(f'{package}.{folder}'), short)
-            topic = self._spool.bag.add_topic(name, kind)
         except (ImportError, AttributeError, BagError) as error:
             self._refuse(name, str(error))
             return
@@ -207,13 +238,20 @@ class Recorder(Node):
             'Messages dropped': spool.dropped,
             'Free disk (B)': free_bytes(bag.path),
             'Topics refused': ' '.join(sorted(self._refused)),
-            **{f'Messages on {name}': count for name, count in bag.counts.items()},
+            'Messages': sum(bag.counts.values()),
+            'Topics': len(self._recorded),
+            **{f'Messages on {name}': count for name, count in _first(bag.counts)},
             **{f'Messages lost on {name}': count for name, count in self.lost.items() if count},
         }
         status.values = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
         message = DiagnosticArray(status=[status])
         message.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(message)
+
+
+def _first(counts: dict[str, int]) -> list[tuple[str, int]]:
+    """Return the counts of the first topics: a thousand pairs a second cost a core its share."""
+    return list(counts.items())[:MOST_SHOWN]
 
 
 def free_bytes(path: Path) -> int:
