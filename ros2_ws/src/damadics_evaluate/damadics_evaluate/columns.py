@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats: TypeAlias = NDArray[np.float64]
-Columns: TypeAlias = dict[str, NDArray]
+Columns: TypeAlias = dict[str, np.ndarray]
 
 SIGNALS = ('cv', 'x1', 'p1', 'p2', 't1', 'flow')
 NANOSECONDS = 1e9
@@ -23,7 +23,7 @@ SCALE = {'cv': 1.0, 'x1': 1.0, 'p1': 4e6, 'p2': 4e6, 't1': 200.0, 'flow': 40.0 /
 """Full scale of every signal in SI (benchmark definition: 4 MPa, 200 degC, 40 t/h)."""
 
 
-def rows_of(columns: Mapping[str, NDArray]) -> Floats:
+def rows_of(columns: Mapping[str, np.ndarray]) -> Floats:
     """
     Return columns as scaled rows.
 
@@ -55,7 +55,7 @@ def columns_of(rows: Floats) -> Columns:
     return columns
 
 
-def cut(columns: Mapping[str, NDArray], start: float, end: float) -> Columns:
+def cut(columns: Mapping[str, np.ndarray], start: float, end: float) -> Columns:
     """
     Return the samples of a stretch.
 
@@ -69,7 +69,7 @@ def cut(columns: Mapping[str, NDArray], start: float, end: float) -> Columns:
     return {name: values[kept] for name, values in columns.items()}
 
 
-def stretches(columns: Mapping[str, NDArray], gap: float) -> list[slice]:
+def stretches(columns: Mapping[str, np.ndarray], gap: float) -> list[slice]:
     """
     Return the parts of a record between which nothing was recorded.
 

@@ -16,7 +16,6 @@ from damadics_fd.core.scada.learning import learn
 from damadics_fd.core.scada.monitor import ScadaMonitor
 from damadics_fd.core.scada.settings import ScadaSettings
 from damadics_fd.core.scada.state import HISTORY_LENGTH
-from numpy.typing import NDArray
 
 from damadics_evaluate.columns import Floats
 from damadics_evaluate.detectors.base import P1, P2, T1, Detector, Diagnosis, Setting
@@ -48,7 +47,7 @@ class Scada(Detector):
         inputs = (('p1', P1), ('p2', P2), ('t1', T1))
         self._mean = {name: float(np.nanmean(rows[:, column])) for name, column in inputs}
 
-    def trace(self, samples: Floats) -> NDArray:
+    def trace(self, samples: Floats) -> np.ndarray:
         """Return the monitor's trace over a run that starts at rest."""
         self.monitor.reset()
         trace = self.monitor.run_samples(samples)
@@ -148,10 +147,10 @@ class FlowThreshold(ModelThreshold):
     column = 'r2'
 
 
-_last: list[tuple[Floats, Floats, NDArray]] = []  # hour, samples, trace of the last run
+_last: list[tuple[Floats, Floats, np.ndarray]] = []  # hour, samples, trace of the last run
 
 
-def _shared_trace(hour: Floats, samples: Floats) -> NDArray:
+def _shared_trace(hour: Floats, samples: Floats) -> np.ndarray:
     """Return the monitor's trace; two detectors in a row on the same run share it."""
     if not _last or _last[0][0] is not hour or _last[0][1] is not samples:
         detector = Scada()

@@ -39,7 +39,7 @@ class Features:
         plain = self._plain(np.nan_to_num(samples))
         if len(plain) < WINDOW:
             return np.empty((0, plain.shape[1]))
-        return np.clip((plain - self._mean) / self._scale, -50.0, 50.0)
+        return np.asarray(np.clip((plain - self._mean) / self._scale, -50.0, 50.0))
 
     def _plain(self, rows: Floats) -> Floats:
         stem = rows[:, X] - _stem_design(rows) @ self._stem

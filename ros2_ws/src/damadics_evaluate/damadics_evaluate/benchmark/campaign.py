@@ -66,8 +66,12 @@ class Campaign:
     def of_manifest(cls, stated: Result) -> 'Campaign':
         """Return the campaign that a manifest states; settings of other versions are left out."""
         names = {item.name for item in fields(cls)}
-        plain = {k: tuple(v) if isinstance(v, list) else v for k, v in stated.items()}
-        return cls(**{k: v for k, v in plain.items() if k in names})
+        known: Result = {
+            name: tuple(value) if isinstance(value, list) else value
+            for name, value in stated.items()
+            if name in names
+        }
+        return cls(**known)
 
     def settings_hash(self, detector: str) -> str:
         """Return a hash of everything but scenario and seed that shapes a detector's results."""

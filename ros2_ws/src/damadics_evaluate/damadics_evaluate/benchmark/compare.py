@@ -19,7 +19,7 @@ def compare(first: Sequence[Result], second: Sequence[Result]) -> list[Result]:
         allows for the number of rows.
     """
     left, right = scenario_results(first), scenario_results(second)
-    rows = []
+    rows: list[Result] = []
     for key in sorted(left.keys() & right.keys()):
         a = {r['seed']: t for r, t in zip(left[key], delays(left[key]), strict=True)}
         b = {r['seed']: t for r, t in zip(right[key], delays(right[key]), strict=True)}
@@ -54,7 +54,7 @@ def overall(first: Sequence[Result], second: Sequence[Result]) -> list[Result]:
         median of the paired differences of the delay with its 95 % interval, sign test.
     """
     left, right = scenario_results(first), scenario_results(second)
-    rows = []
+    rows: list[Result] = []
     for detector in sorted({name for _, name in left.keys() & right.keys()}):
         pairs = []
         for key in left.keys() & right.keys():

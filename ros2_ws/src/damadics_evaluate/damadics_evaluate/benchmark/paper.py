@@ -110,7 +110,7 @@ def _edges(result: Result) -> Alarms:
     return np.array([event.stamp * 1e-9 for event in result.detections])
 
 
-def _figure(result: Result, columns: Mapping[str, NDArray], name: str) -> str:
+def _figure(result: Result, columns: Mapping[str, np.ndarray], name: str) -> str:
     from damadics_fd.figures.panels import six_panels
 
     with tempfile.TemporaryDirectory() as folder:
@@ -136,7 +136,7 @@ def _rising(t: Floats, exceeds: NDArray[np.bool_]) -> Alarms:
     return t[exceeds & ~before]
 
 
-def _samples(columns: Mapping[str, NDArray], clean: Mapping[str, NDArray]) -> Floats:
+def _samples(columns: Mapping[str, np.ndarray], clean: Mapping[str, np.ndarray]) -> Floats:
     samples = rows_of(columns)
     samples[:, 1] = clean['cv']
     return samples

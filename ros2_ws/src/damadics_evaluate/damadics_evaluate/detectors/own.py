@@ -17,7 +17,6 @@ from importlib.metadata import entry_points
 from typing import ClassVar, NamedTuple, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from damadics_evaluate.columns import Columns, Floats, columns_of
 from damadics_evaluate.detectors.base import Detector, Setting
@@ -48,7 +47,7 @@ class OffLine(Protocol):
         """Learn from a fault-free record."""
         ...
 
-    def statistic(self, columns: Columns) -> NDArray:
+    def statistic(self, columns: Columns) -> np.ndarray:
         """Return one value per sample; the larger, the worse."""
         ...
 

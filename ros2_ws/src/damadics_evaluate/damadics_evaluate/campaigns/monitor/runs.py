@@ -119,8 +119,8 @@ def paper_run(
     )
     columns = simulate(scenario, rate=RATE, model=model, noise=not force_exact, seed=seed)
     if force_exact:
-        columns = exact_force(columns, seed)
-    return summary(run(columns, EXACT if force_exact else APPROXIMATOR))
+        return summary(run(exact_force(columns, seed), EXACT))
+    return summary(run(columns, APPROXIMATOR))
 
 
 def hour(seed: int, fault: str, start: float) -> dict[str, Any]:

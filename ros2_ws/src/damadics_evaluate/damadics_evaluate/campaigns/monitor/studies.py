@@ -24,7 +24,7 @@ from damadics_evaluate.campaigns.monitor.runs import (
     paper_run,
     random_scenario,
 )
-from damadics_evaluate.campaigns.monitor.sums import delays, quiet, seconds
+from damadics_evaluate.campaigns.monitor.sums import approximator, delays, quiet, seconds
 
 
 def anchors(runs: int, workers: int) -> dict[str, Any]:
@@ -52,7 +52,7 @@ def anchors(runs: int, workers: int) -> dict[str, Any]:
         )
         result = run(simulate(scenario, rate=RATE, model='lugre'), APPROXIMATOR)
         out[f'lugre {fault} {strength:+g}'] = seconds(result)
-    variants = {
+    variants: dict[str, dict[str, Any]] = {
         'threshold of eq. (16)': {'threshold': 'paper'},
         'high-pass .02': {'velocity': 'high_pass'},
         'high-pass .05': {'velocity': 'high_pass', 'tau': 0.05},
@@ -231,7 +231,7 @@ def slow(runs: int, workers: int) -> dict[str, Any]:
     good = result.estimates[result.accepted]  # the noise takes some p1 out of range
     finite = all(np.isfinite(good[name]).all() for name in ('xi1', 'xi2', 'phi', 'x2'))
     norm = np.sqrt(
-        sum(np.sum(result.estimator.state[name] ** 2) for name in ('w1', 'w2', 'eps1', 'b1'))
+        sum(np.sum(approximator(result).state[name] ** 2) for name in ('w1', 'w2', 'eps1', 'b1'))
     )
     return {
         'samples': n,

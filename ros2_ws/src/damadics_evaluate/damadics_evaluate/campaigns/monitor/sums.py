@@ -5,12 +5,19 @@
 from typing import Any
 
 import numpy as np
+from damadics_fd.core.approximator.estimator import Estimator
 from damadics_fd.core.modes import PHASE_MONITOR
 from damadics_fd.core.result import Result
 
 
 def seconds(result: Result) -> list[float]:
     return [round(event.stamp * 1e-9, 4) for event in result.detections]
+
+
+def approximator(result: Result) -> Estimator:
+    if not isinstance(result.estimator, Estimator):
+        raise TypeError('these studies are of mode monitor')
+    return result.estimator
 
 
 def summary(result: Result) -> dict[str, Any]:
@@ -22,7 +29,7 @@ def summary(result: Result) -> dict[str, Any]:
     counts &= (x > 0.02) & (x < 0.965)
     return {
         'alarms': seconds(result),
-        'refusals': int(result.estimator.state[0].unsettled),
+        'refusals': int(approximator(result).state[0].unsettled),
         'armed': float(result.estimates['stamp'][armed[0]] * 1e-9) if len(armed) else None,
         'phi': float(result.estimates['phi'][-1]),
         'ratio': float(decisions['ratio'][counts].max()) if counts.any() else 0.0,

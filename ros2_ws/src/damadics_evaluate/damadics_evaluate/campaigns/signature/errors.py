@@ -62,7 +62,8 @@ def plug(runs: int) -> dict[str, Any]:
     }
     rows = []
     for name, faults in cases.items():
-        found = {key: Counter() for key in errors}
+        found: dict[str, Counter[str]] = {key: Counter() for key in errors}
+        kappa = dict.fromkeys(errors, 0.0)
         for k in tqdm(range(runs), desc=f'plug, {name}'):
             columns = plant_run(7000 + k, 430.0, 'lugre', faults)
             for key, make in errors.items():
@@ -79,7 +80,7 @@ def plug(runs: int) -> dict[str, Any]:
                 )
                 found[key]['alarm'] += bool(result.detections)
                 found[key][family(CAUSES[s.cause])] += 1
-                found[key]['kappa'] = max(found[key]['kappa'], round(float(s.kappa), 2))
+                kappa[key] = max(kappa[key], round(float(s.kappa), 2))
         rows += [
             {
                 'fault': name,
@@ -90,7 +91,7 @@ def plug(runs: int) -> dict[str, Any]:
                 'before 230 s': c['early'],
                 'called friction': c['friction'],
                 'called elastic': c['elastic'],
-                'largest kappa': c['kappa'],
+                'largest kappa': kappa[key],
             }
             for key, c in found.items()
         ]
@@ -100,7 +101,7 @@ def plug(runs: int) -> dict[str, Any]:
 def sensors(runs: int) -> dict[str, Any]:
     """Sensor faults in the measurement only: name and size from stage 2."""
 
-    def change(name: str, gain: float = 0.0, offset: float = 0.0) -> Callable:
+    def change(name: str, gain: float = 0.0, offset: float = 0.0) -> Callable[[Columns], None]:
         def apply(columns: Columns) -> None:
             late = columns['stamp'] >= 150e9
             columns[name] = np.where(late, columns[name] * (1 + gain) + offset, columns[name])
@@ -129,7 +130,8 @@ def sensors(runs: int) -> dict[str, Any]:
     cases += [('P1 offset 50 kPa', 'dp_offset', 50e3, change('p1', offset=50e3))]
     rows = []
     for name, truth, size, apply in tqdm(cases, desc='sensors'):
-        named, firm, values, seen = 0, 0, [], Counter()
+        named, firm, values = 0, 0, []
+        seen: Counter[str] = Counter()
         for k in range(runs):
             columns = plant_run(8000 + k, 420.0)
             apply(columns)
@@ -162,7 +164,8 @@ def supply(runs: int) -> dict[str, Any]:
         ('600 to 500 kPa', Fault('f16', 1 / 6, 300.0)),
         ('leak f9 = 1', Fault('f9', 1.0, 300.0)),
     ):
-        delays, values, seen = [], [], Counter()
+        delays, values = [], []
+        seen: Counter[str] = Counter()
         for k in range(runs):
             result = run(plant_run(9000 + k, 900.0, 'lugre', (fault,)), SETTINGS)
             rowsof = np.flatnonzero(result.decisions['cause'] == CAUSES.index('supply'))

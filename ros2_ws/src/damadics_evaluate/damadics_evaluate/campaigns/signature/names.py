@@ -4,6 +4,7 @@
 
 from collections import Counter
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from tqdm import tqdm
 from damadics_evaluate.campaigns.signature.valves import (
     RATE,
     SETTINGS,
+    Build,
     causes_at,
     family,
     first_alarm,
@@ -26,7 +28,7 @@ from damadics_evaluate.campaigns.signature.valves import (
 
 def isolation(runs: int) -> dict[str, Any]:
     """Friction against the elastic family at several times after the alarm."""
-    cases: list[tuple[str, str, str, Callable[[float], tuple[tuple[Fault, ...], dict]]]] = [
+    cases: list[tuple[str, str, str, Callable[[float], Build]]] = [
         ('lugre', 'friction', 'ramp to +20', lambda t: ((Fault('f4', 1.0, t, 20.0),), {})),
         ('lugre', 'friction', 'ramp to +5', lambda t: ((Fault('f4', 0.25, t, 20.0),), {})),
         ('lugre', 'friction', 'step +3', lambda t: ((Fault('f4', 0.15, t),), {})),
@@ -40,15 +42,15 @@ def isolation(runs: int) -> dict[str, Any]:
                     model,
                     'elastic',
                     f'spring {change:+.0%}',
-                    lambda t, m=model, c=change: stiffened(m, c, t),
+                    partial(stiffened, model, change),
                 )
             )
     delays = (2, 5, 10, 20, 30, 60)
-    total = {n: Counter() for n in delays}
+    total: dict[int, Counter[str]] = {n: Counter() for n in delays}
     rows, wrong, sizes = [], [], {}
     for model, truth, name, make in tqdm(cases, desc='isolation'):
-        counts = {n: Counter() for n in delays}
-        confusion: Counter = Counter()
+        counts: dict[int, Counter[str]] = {n: Counter() for n in delays}
+        confusion: Counter[str] = Counter()
         first, values, missed, before = [], [], 0, 0
         for k in range(runs):
             cv = 'random' if k % 13 < 10 else 'paper'

@@ -3,6 +3,7 @@
 """Small steps, strong changes, slow drifts: what is found, named and how well sized."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from tqdm import tqdm
 from damadics_evaluate.campaigns.signature.valves import (
     RATE,
     SETTINGS,
+    Build,
     family,
     first_alarm,
     plant_run,
@@ -22,9 +24,13 @@ from damadics_evaluate.campaigns.signature.valves import (
 )
 
 
+def unchanged(fault: Fault) -> Build:
+    return (fault,), {}
+
+
 def small(runs: int) -> dict[str, Any]:
     """Small steps, mostly for the own alarm."""
-    cases: list[tuple[str, str, str, float, Callable]] = []
+    cases: list[tuple[str, str, str, float, Callable[[], Build]]] = []
     for change in (-1.0, -0.5, -0.3, 0.3, 0.5, 1.0, 3.0):
         fault = Fault('f4', change if change < 0 else change / 20.0, 150.0)
         cases.append(
@@ -33,7 +39,7 @@ def small(runs: int) -> dict[str, Any]:
                 f'friction {change:+g}',
                 'friction_down' if change < 0 else 'friction_up',
                 change,
-                lambda f=fault: ((f,), {}),
+                partial(unchanged, fault),
             )
         )
     for model in ('lugre', 'dablib'):
@@ -44,7 +50,7 @@ def small(runs: int) -> dict[str, Any]:
                     f'spring {change:+.0%}',
                     'spring_softer' if change < 0 else 'spring_stiffer',
                     change,
-                    lambda m=model, c=change: stiffened(m, c, 150.0),
+                    partial(stiffened, model, change, 150.0),
                 )
             )
     rows = []
@@ -83,13 +89,13 @@ def small(runs: int) -> dict[str, Any]:
 
 def strong(runs: int) -> dict[str, Any]:
     """Size of strong changes after short and long fault-free operation, VERIFY of 60 s."""
-    cases: list[tuple[str, float, Callable[[float], tuple[tuple[Fault, ...], dict]]]] = [
+    cases: list[tuple[str, float, Callable[[float], Build]]] = [
         ('friction ramp to +20', 20.0, lambda t: ((Fault('f4', 1.0, t, 20.0),), {})),
         ('friction ramp to +5', 5.0, lambda t: ((Fault('f4', 0.25, t, 20.0),), {})),
         ('friction step +3', 3.0, lambda t: ((Fault('f4', 0.15, t),), {})),
     ]
     cases += [
-        (f'spring {change:+.0%}', change, lambda t, c=change: stiffened('lugre', c, t))
+        (f'spring {change:+.0%}', change, partial(stiffened, 'lugre', change))
         for change in (1.0, -1.0, 0.3, -0.3)
     ]
     rows = []

@@ -12,7 +12,7 @@ from damadics_fd.core.signature.state import CAUSES
 from damadics_plant import Actuator, Fault, LuGreActuator, Scenario, simulate
 from damadics_plant.actuator.parameters import RANGES
 from damadics_plant.scenarios.disturbance import CHAMBER_NOISE, HUM, WHITE
-from damadics_plant.scenarios.sources import RandomSteps, Sine, Steps
+from damadics_plant.scenarios.sources import RandomSteps, Sine, Source, Steps
 
 RATE = 200.0
 
@@ -38,6 +38,7 @@ ELASTIC = {
 Columns = dict[str, np.ndarray]
 
 
+Build = tuple[tuple[Fault, ...], dict[str, float]]  # faults and constants of a plant
 NOISE = {'x1', 'ps'}
 
 
@@ -67,12 +68,13 @@ def plant_run(
         actuator = LuGreActuator(**{**build, **constants})
     else:
         actuator = Actuator(**{**build, **constants})
-    if isinstance(cv, str):
-        cv = RandomSteps(seed=seed) if cv == 'random' else paper_cv(duration)
+    drive: Source = cv if isinstance(cv, Steps) else paper_cv(duration)
+    if cv == 'random':
+        drive = RandomSteps(seed=seed)
     scenario = Scenario(
         'campaign',
         duration,
-        cv=cv,
+        cv=drive,
         faults=tuple(faults),
         p1=Sine(3.5e6, 175e3, 0.1, phase[0]),
         p2=Sine(2.6e6, 26e3, 1 / np.pi, phase[1]),
