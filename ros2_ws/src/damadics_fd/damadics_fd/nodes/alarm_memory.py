@@ -55,7 +55,7 @@ class AlarmMemory:
         except ValueError as problem:
             self._lose(str(problem))
             return True
-        self._loaded = self._core.decision.stamp
+        self._loaded = int(self._core.state[0].stamp)
         self._node.get_logger().info(f'alarms of before taken up from {self._store.path}')
         if kept.problem:
             self._node.get_logger().error(f'one of two copies of the alarm: {kept.problem}')

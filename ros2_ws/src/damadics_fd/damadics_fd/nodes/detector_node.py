@@ -12,12 +12,12 @@ from std_msgs.msg import Header
 
 from damadics_fd.causes import explain
 from damadics_fd.core.approximator.state import Estimate
-from damadics_fd.core.decision.alarm import NE107
 from damadics_fd.core.decision.detector import Detector, Outcome
 from damadics_fd.core.decision.events import Decision, Event
 from damadics_fd.core.modes import PHASE_INIT, PHASE_MONITOR
 from damadics_fd.core.text import SENTENCE, plain
 from damadics_fd.nodes.alarm_memory import AlarmMemory
+from damadics_fd.nodes.detector_report import report_of
 from damadics_fd.nodes.managed import MonitoringNode
 from damadics_fd.nodes.operator import OperatorActions, OperatorServices
 from damadics_fd.nodes.second_publisher import RivalWatch
@@ -213,40 +213,15 @@ class DetectorNode(MonitoringNode):
         decision = self._decision
         if decision is None:
             return Level.ERROR, 'no estimate has arrived', {}
-        statistics = self._core.statistics
-        values = {
-            'Fault': decision.fault,
-            'Residual (1/s)': decision.residual,
-            'Threshold (1/s)': decision.threshold,
-            'Ratio': decision.residual / decision.threshold if decision.threshold else 0.0,
-            'Faults since the start': decision.occurrence,
-            'Acknowledged': decision.acknowledged,
-            'Near misses': statistics['near_misses'],
-            'Chatter': bool(statistics['chatter']),
-            'Estimates judged': self._judged,
-            'Estimates received twice': self._twice,
-            'NE 107': NE107[decision.level],
-            **self._memory.values,
-            **self._signature.values,
-        }
-        if self._memory.problem:
-            return Level.ERROR, self._memory.problem, values
-        if decision.state == FaultFlag.STATE_UNKNOWN:
-            return Level.ERROR, LOST, values
-        if self.watch.silent:
-            return Level.ERROR, 'estimates have stopped: not monitoring', values
-        if decision.fault:
-            return Level.ERROR, f'fault {decision.occurrence} flagged', values
-        if self._twice:
-            return Level.WARN, 'estimates arrive twice: end one of the estimators', values
-        if decision.level:
-            return Level.WARN, f'{NE107[decision.level]}: no faults are reported', values
-        if self._signature.problem:
-            return Level.WARN, self._signature.problem, values
-        return Level.OK, 'no fault flagged', values
-
-
-LOST = 'the alarm of before is lost: look at the valve, then acknowledge'
+        return report_of(
+            decision,
+            self._core,
+            self._memory,
+            self._signature,
+            judged=self._judged,
+            twice=self._twice,
+            silent=self.watch.silent,
+        )
 
 
 def main(args: list[str] | None = None) -> int:

@@ -5,12 +5,10 @@
 import math
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 from damadics_msgs.msg import Estimate as EstimateMessage
 from damadics_msgs.msg import Measurement, OperatorAction
-from damadics_msgs.srv import Reference as ReferenceService
 from damadics_msgs.srv import Relearn
 
 from damadics_fd.core.decision.alarm import (
@@ -22,22 +20,15 @@ from damadics_fd.core.decision.alarm import (
 )
 from damadics_fd.core.monitor import estimator_for
 from damadics_fd.core.quality import Reason, Refused
-from damadics_fd.core.text import plain
 from damadics_fd.nodes.frozen_position import FrozenPosition
 from damadics_fd.nodes.managed import MonitoringNode
 from damadics_fd.nodes.operator import OperatorActions
+from damadics_fd.nodes.reference_keeper import ReferenceKeeper
 from damadics_fd.ros import qos
 from damadics_fd.ros.arguments import check_node_arguments
 from damadics_fd.ros.conversions import sample, write_estimate
 from damadics_fd.ros.diagnostics import Level, Report
 from damadics_fd.ros.spin import spin
-from damadics_fd.store.references import (
-    NoReferenceError,
-    Reference,
-    load_reference,
-    reference_path,
-    save_reference,
-)
 
 DESCRIPTION = 'Estimate velocity and residual of one valve with the on-line approximator.'
 EXAMPLES = """examples:
@@ -46,7 +37,6 @@ EXAMPLES = """examples:
   ros2 run damadics_fd estimator --ros-args -r __ns:=/lv101 --params-file valve.param.yaml"""
 START_PLANT = 'start a driver of the valve, or the simulator: ros2 run damadics_plant plant'
 READY = (1, 0.5, 0.5, 0.0, 0.0, 20.0, 0.0, 0.0)  # a sample that makes the core compile
-RETRY = 10.0  # s of wall time between two tries to keep what was learned
 RECENT = 1.5  # s of wall time for which a refused sample is told
 
 
@@ -78,20 +68,14 @@ class EstimatorNode(MonitoringNode):
         self._message = EstimateMessage()
         self._last = self._core.phase
         self._refused_at = -math.inf  # monotonic time of the last refused sample [s]
-        self._unsaved = ''  # why what was learned is not kept
         self._frozen = FrozenPosition()
         self._publisher = made.publisher(EstimateMessage, 'estimate', qos.SAMPLES)
         self._actions = OperatorActions(self, made, self.actuator)
         made.service(Relearn, 'relearn', self._relearn)
-        made.service(ReferenceService, 'save_reference', self._save_service)
-        made.service(ReferenceService, 'load_reference', self._load_service)
-        if self._path:
-            done, text = self._load(self._path)
-            if done:
-                self.get_logger().info(text)
-            else:
-                self.get_logger().warning(text)
-            made.timer(RETRY, self._save_again)
+        self._reference = ReferenceKeeper(
+            self, made, self._actions, self._core, self.actuator, self.settings, self._path
+        )
+        self._reference.restore()
         self.watch.subscribe(Measurement, self._take, qos.SAMPLES)
 
     def _take(self, measurement: Measurement) -> None:
@@ -111,78 +95,8 @@ class EstimatorNode(MonitoringNode):
             learned = phase == 'monitor' and self._last.startswith('learn')
             self._last = phase
             self.diagnostics.check()
-            if learned and self._path:
-                self._keep(self._path)
-
-    def _keep(self, path: Path) -> None:
-        """Keep what was learned; where that fails, it is told and tried again."""
-        done, text = self._save(path)
-        self._unsaved = '' if done else text
-        log = self.get_logger()
-        if done:
-            log.info(text)
-        else:
-            log.error(text, throttle_duration_sec=60.0)
-
-    def _save_again(self) -> None:
-        if self._unsaved and self._path and self._core.phase == 'monitor':
-            self._keep(self._path)
-
-    def _save(self, path: Path) -> tuple[bool, str]:
-        try:
-            reference = Reference(
-                self.actuator,
-                self._core.learned(),
-                self.settings.to_dict(),
-                source='live',
-                last_stamp=self._core.last_stamp,
-            )
-            return True, f'reference saved: {save_reference(path, reference)}'
-        except (ValueError, OSError) as problem:
-            return False, f'reference not saved: {problem}'
-
-    def _load(self, path: Path) -> tuple[bool, str]:
-        try:
-            reference = load_reference(path, self.actuator, self.settings)
-            self._core.restore(reference.learned)
-        except NoReferenceError as problem:
-            return False, f'no reference, the valve is learned: {problem}'
-        except ValueError as problem:
-            return False, f'reference refused, the valve is learned: {problem}'
-        return True, f'reference loaded: {path}, {plain(reference.source)}'
-
-    def _save_service(
-        self, request: ReferenceService.Request, response: ReferenceService.Response
-    ) -> ReferenceService.Response:
-        return self._of_path(OperatorAction.SAVE_REFERENCE, request, response, self._save)
-
-    def _load_service(
-        self, request: ReferenceService.Request, response: ReferenceService.Response
-    ) -> ReferenceService.Response:
-        self._of_path(OperatorAction.LOAD_REFERENCE, request, response, self._load)
-        self.diagnostics.publish()
-        return response
-
-    def _of_path(
-        self,
-        action: int,
-        request: ReferenceService.Request,
-        response: ReferenceService.Response,
-        act: Callable[[Path], tuple[bool, str]],
-    ) -> ReferenceService.Response:
-        try:
-            path = reference_path(request.path, self._path)
-        except ValueError as problem:
-            response.message = str(problem)
-        else:
-            response.success, response.message = act(path)
-        self._actions.tell(
-            action,
-            response.success,
-            response.message,
-            stamp=self._core.last_stamp,
-        )
-        return response
+            if learned:
+                self._reference.keep()
 
     def _relearn(self, request: Relearn.Request, response: Relearn.Response) -> Relearn.Response:
         if self.settings.mode == 'paper':
@@ -220,8 +134,8 @@ class EstimatorNode(MonitoringNode):
         if time.monotonic() - self._refused_at < RECENT:
             explanation = self._core.refused.explanation if self._core.refused else ''
             return Level.WARN, f'samples refused: {explanation}', values
-        if self._unsaved:
-            return Level.WARN, self._unsaved, values
+        if self._reference.problem:
+            return Level.WARN, self._reference.problem, values
         if good and self._frozen.problem:
             return Level.WARN, self._frozen.problem, values
         return Level.OK if good else Level.WARN, self._core.status, values

@@ -171,6 +171,7 @@ def test_shelf_masks_records_and_ends_by_itself():  # AM-6
     assert valve.names() == ['raised', 'unshelved']
     assert not valve.detector.shelve(math.nan).done
     assert not valve.detector.shelve(-1.0).done
+    assert not valve.detector.shelve(5e-324).done
     assert not valve.detector.unshelve().done
 
 

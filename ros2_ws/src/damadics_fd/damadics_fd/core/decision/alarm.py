@@ -74,7 +74,7 @@ class Alarm(Record):
 
 
 NEVER = -1
-LONGEST_SHELF = 30 * 86400.0  # s
+LEAST_SHELF, LONGEST_SHELF = 0.01, 30 * 86400.0  # s
 
 
 class Answer(NamedTuple):
@@ -335,11 +335,12 @@ def shelve(a: Alarm, seconds: float) -> Answer:
 
     :param a: alarm record.
     :param seconds: how long, counted in stamps of the measurement.
-    :return: the answer; refused for a time that is not positive or longer than 30 days.
+    :return: the answer; refused for less than a sample or more than 30 days.
     """
-    if not 0.0 < seconds <= LONGEST_SHELF:
+    if not LEAST_SHELF <= seconds <= LONGEST_SHELF:
         return Answer(
-            False, f'cannot shelve for {seconds:g} s: give 0 < seconds <= {LONGEST_SHELF:.0f}'
+            False,
+            f'cannot shelve for {seconds:g} s: give {LEAST_SHELF:g} to {LONGEST_SHELF:.0f} s',
         )
     a.shelved_until = max(a.stamp, 0) + math.ceil(seconds * 1e9)
     refresh(a)
