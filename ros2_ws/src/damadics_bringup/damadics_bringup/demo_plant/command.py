@@ -29,7 +29,7 @@ from damadics_bringup.demo_plant.listeners import (
     server_sent_events,
     webhook,
 )
-from damadics_bringup.demo_plant.opcua_plant import TAGS
+from damadics_bringup.demo_plant.tags import TAGS
 from damadics_bringup.processes import ProcessError, Processes, free_domain, surroundings
 
 EXAMPLE = """example:

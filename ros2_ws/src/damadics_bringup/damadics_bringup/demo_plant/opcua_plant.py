@@ -16,18 +16,11 @@ from asyncua import Node, Server, ua
 from damadics_fd.ros.arguments import command_parser
 from damadics_plant import Simulator
 
+from damadics_bringup.demo_plant.tags import TAGS
+
 EXAMPLE = """example:
   ros2 run damadics_bringup opcua_plant --port 4840
 then write 4 to the variable LV103.Fault: friction; 0 clears it."""
-TAGS = {  # signal: end of its name, unit, factor from SI
-    'cv': ('MV', 100.0),
-    'x1': ('PV', 100.0),
-    'p1': ('P1', 1e-5),
-    'p2': ('P2', 1e-5),
-    't1': ('T1', 1.0),
-    'flow': ('FLOW', 3.6),
-    'ps': ('PS', 1e-5),
-}
 BLOCK = 0.1  # s simulated at once
 
 
