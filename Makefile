@@ -10,7 +10,7 @@ READERS := tools/npm/node_modules/.package-lock.json
 SOURCES := $(shell find ros2_ws/src -type f -not -name '*.pyc' -not -path '*/__pycache__/*' \
 	-not -path '*/test/*' -not -path '*/.pytest_cache/*')
 
-.PHONY: help demo demo-plant dashboard test report campaign-monitor build env lint types docs lock attack licences clean
+.PHONY: help demo demo-plant dashboard test report campaign-monitor build env lint types docs lock soak attack licences clean
 
 help: ## show what can be made
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 18
@@ -63,6 +63,9 @@ docs: $(BUILT) ## the documentation with the API pages: docs/_build/index.html
 
 lock: ## pin every package with its hashes, after a change of tools/requirements
 	@.venv/bin/python tools/lock.py
+
+soak: $(BUILT) ## two valves, page and recorder for hours: memory, false alarms, samples (90 min; less: ARGS)
+	@$(ENV) && python tools/soak.py $(ARGS)
 
 attack: $(BUILT) ## damaged state files, odd requests, killed nodes: what is lost? (hours; less: ARGS)
 	@$(ENV) && python tools/attack.py $(ARGS)
