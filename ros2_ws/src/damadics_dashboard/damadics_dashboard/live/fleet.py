@@ -5,10 +5,11 @@
 import math
 from collections.abc import Callable
 
+from damadics_fd.core.stamps import SECOND as NANO
 from damadics_fd.core.text import NAME, plain
 from damadics_msgs.msg import FaultFlag, FleetEvent, FleetLayout, FleetStatus
 
-from damadics_dashboard.live.valve import NANO, Valve
+from damadics_dashboard.live.valve import Valve
 
 Meet = Callable[[str], Valve]
 

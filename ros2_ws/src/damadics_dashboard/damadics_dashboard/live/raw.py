@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 from damadics_fd.bag.cdr.definition import Definition, parse_definition, schema_text
 from damadics_fd.bag.cdr.layout import Layout, layout_of
+from damadics_fd.core.stamps import SECOND as NANO
 from numpy.typing import NDArray
-
-from damadics_dashboard.live.traces import NANO
 
 
 @cache
@@ -32,6 +31,11 @@ class Batch:
         self._messages: list[bytes] = []
         self._layout: Layout | None = None
         self.dtype = np.dtype([('stamp', 'i8'), *((name, 'f8') for name in columns)])
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the columns beside `stamp`."""
+        return tuple(self._columns)
 
     def take(self, message: bytes) -> None:
         """Keep one message; cheap, for it is called for each."""

@@ -5,10 +5,9 @@
 import math
 from typing import Any
 
+from damadics_fd.core.stamps import SECOND as NANO
 from damadics_fd.core.text import COMMENT, NAME, SENTENCE, plain
 from damadics_msgs.msg import FaultEvent, OperatorAction
-
-from damadics_dashboard.live.traces import NANO
 
 NUMBERS = ('residual', 'threshold', 'ratio', 'duration', 'confidence', 'strength')
 ACTIONS = (

@@ -8,11 +8,11 @@ import time
 from collections import defaultdict
 
 import numpy as np
+from damadics_fd.core.stamps import SECOND as NANO
 from damadics_fd.store.intervals import DAY, LEVELS, Intervals, Spread
 from damadics_msgs.msg import Signature
 
 from damadics_dashboard.live.motion import Motion
-from damadics_dashboard.live.traces import NANO
 from damadics_dashboard.live.valve import Valve
 
 OLDEST = 10.0  # s; an older signature is not one of now

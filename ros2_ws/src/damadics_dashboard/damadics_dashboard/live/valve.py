@@ -8,11 +8,12 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from damadics_fd.core.freshness import Freshness, default_max_age
+from damadics_fd.core.stamps import SECOND as NANO
 from damadics_fd.core.text import NAME, plain
 from damadics_msgs.msg import FaultEvent, FaultFlag, Isolation, Signature
 
 from damadics_dashboard.live.raw import Batch
-from damadics_dashboard.live.traces import NANO, Trace
+from damadics_dashboard.live.traces import Trace
 
 HEARTBEAT_LOST = 2.0  # s; the detector repeats its flag every second
 SAMPLES_LOST = 0.6  # s, or three periods of the samples
@@ -101,7 +102,7 @@ class Valve:
             'threshold': Batch('damadics_msgs/msg/Float64Stamped', {'rho': 'data'}),
         }
         self.traces = {
-            topic: Trace(tuple(batch.dtype.names[1:]), WINDOW, MOST_SAMPLES)
+            topic: Trace(batch.columns, WINDOW, MOST_SAMPLES)
             for topic, batch in self.batches.items()
         }
 
@@ -170,7 +171,7 @@ class Valve:
         :param topic: its name.
         """
         self.batches[topic].drain()
-        self.traces[topic] = Trace(self.traces[topic].dtype.names[1:], WINDOW, MOST_SAMPLES)
+        self.traces[topic] = Trace(self.batches[topic].columns, WINDOW, MOST_SAMPLES)
         if topic == 'threshold':
             self.threshold_at, self.period = -1e9, 0.0
 

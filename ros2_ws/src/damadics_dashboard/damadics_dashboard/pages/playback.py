@@ -14,10 +14,11 @@ from damadics_fd.commands.replay.bags import joined
 from damadics_fd.core.decision.events import Event
 from damadics_fd.core.monitor import monitor_for
 from damadics_fd.core.settings import Settings
+from damadics_fd.core.stamps import SECOND as NANO
 from damadics_fd.figures.decimation import Thinner
 from numpy.typing import NDArray
 
-from damadics_dashboard.live.traces import NANO, Points, block_means, envelope
+from damadics_dashboard.live.traces import Points, block_means, envelope
 from damadics_dashboard.pages.plots import BLOCK, SMALLEST
 
 INTERVALS = 1200  # across the plots of a whole recording

@@ -6,10 +6,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from damadics_fd.core.stamps import SECOND as NANO
 from nicegui import ui
 from numpy.typing import NDArray
 
-from damadics_dashboard.live.traces import NANO, Points, Trace, block_means, envelope
+from damadics_dashboard.live.traces import Points, Trace, block_means, envelope
 from damadics_dashboard.pages.elements import box, tell, with_values
 
 BUCKETS = 300  # intervals across a plot: two points each at most

@@ -6,10 +6,11 @@ import time
 from typing import Any
 from urllib.parse import unquote
 
+from damadics_fd.core.stamps import SECOND as NANO
 from damadics_fd.core.text import NAME, plain
 from nicegui import ui
 
-from damadics_dashboard.live.valve import NANO, Condition, Valve
+from damadics_dashboard.live.valve import Condition, Valve
 from damadics_dashboard.live.watcher import Watcher
 from damadics_dashboard.pages.actions import valve_buttons
 from damadics_dashboard.pages.alarms import AlarmList

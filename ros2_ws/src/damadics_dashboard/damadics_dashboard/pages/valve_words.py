@@ -9,10 +9,11 @@ from typing import Any
 from urllib.parse import quote
 
 from damadics_fd.causes import Cause
+from damadics_fd.core.stamps import SECOND as NANO
 from damadics_fd.core.text import SENTENCE, plain
 from damadics_msgs.msg import FaultEvent
 
-from damadics_dashboard.live.valve import NANO, NE107, Alarm, Condition, Valve
+from damadics_dashboard.live.valve import NE107, Alarm, Condition, Valve
 from damadics_dashboard.words.texts import Texts
 
 SHARED = ('', 'none')
@@ -201,6 +202,8 @@ def _row(row: dict[str, Any], t: Texts) -> dict[str, Any]:
     if transition in (FaultEvent.RAISED, FaultEvent.CHANGED):
         what, numbers, advice = headline(row, t)
     told = plain(row['text'] or '', SENTENCE)
+    if what and told.endswith(']'):  # the words of the cause stand before the numbers
+        told = told[told.rfind('[') + 1 : -1]
     return {
         'moment': t.moment(row['stamp']),
         'valve': row['valve'] or 'valve',

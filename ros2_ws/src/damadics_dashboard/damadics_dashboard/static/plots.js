@@ -57,8 +57,14 @@
   function axis(entry, chart) {
     const [from, to] = entry.range;
     const [a, b] = shown(entry);
+    const width = step(b - a, chart);
+    // round in local time: a day begins at midnight here
+    const shift = from < DATED ? 0 : -60 * new Date(from * 1000).getTimezoneOffset();
+    const ticks = [];
+    for (let t = Math.ceil((a + shift) / width) * width - shift; t <= b; t += width) ticks.push(t);
     return {
-      min: from, max: to, interval: step(b - a, chart),
+      min: from, max: to,
+      axisTick: { customValues: ticks }, axisLabel: { customValues: ticks },
       name: from < DATED ? '' : zone(from),
     };
   }

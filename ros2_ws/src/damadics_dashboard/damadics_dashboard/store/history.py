@@ -231,7 +231,8 @@ class History:
 
 
 def _where(wanted: Wanted, columns: Sequence[str]) -> tuple[str, tuple[Any, ...]]:
-    where, values = 'seen >= ? AND seen < ?', (wanted.since, wanted.until)
+    where = 'seen >= ? AND seen < ?'
+    values: tuple[str | float, ...] = (wanted.since, wanted.until)
     if wanted.valve is not None:
         where, values = f'{where} AND valve = ?', (*values, wanted.valve)
     for word in wanted.text.split():
