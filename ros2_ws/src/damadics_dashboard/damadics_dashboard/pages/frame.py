@@ -116,7 +116,7 @@ def frame(title: str, here: str, watcher: Watcher) -> Iterator[Texts]:
         box('span', 'spacer')
         with box('span', 'link', role='status'):
             box('i')
-            ui.label(t('good')).props('id=link')
+            ui.label(t('loading')).props('id=link')
         _alerts(t)
         _languages(t)
         _theme(t, dark)

@@ -29,7 +29,7 @@
     if (body.dataset.link !== present) {
       body.dataset.link = present;
       const place = document.getElementById('link');
-      if (place) place.textContent = words[present] || '';
+      if (place && words[present]) place.textContent = words[present];
       if (present === 'lost') say(words.lost);
     }
     // what the framework names in its own language, or not at all
