@@ -220,6 +220,7 @@ class DetectorNode(MonitoringNode):
             self._signature,
             judged=self._judged,
             twice=self._twice,
+            rival=self._rival.problem,
             silent=self.watch.silent,
         )
 

@@ -19,6 +19,7 @@ def report_of(
     *,
     judged: int,
     twice: int,
+    rival: str,
     silent: bool,
 ) -> Report:
     """
@@ -30,6 +31,7 @@ def report_of(
     :param signature: of the valve.
     :param judged: estimates judged.
     :param twice: estimates that came a second time.
+    :param rival: another detector judges the valve, '' if none does.
     :param silent: none comes any more.
     :return: level, one sentence, values by name: what is worst comes first.
     """
@@ -55,6 +57,8 @@ def report_of(
         return Level.ERROR, LOST, values
     if silent:
         return Level.ERROR, 'estimates have stopped: not monitoring', values
+    if rival:
+        return Level.ERROR, rival, values
     if decision.fault:
         return Level.ERROR, f'fault {decision.occurrence} flagged', values
     if twice:

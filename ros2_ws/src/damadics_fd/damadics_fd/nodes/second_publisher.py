@@ -11,6 +11,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from damadics_fd.ros.entities import Entities
 
+RECENT = 10.0  # s for which another is told
 NEWCOMER = 4.0  # s after its start in which a node gives way to the one that was there
 
 
@@ -30,8 +31,16 @@ class RivalWatch:
         self._refuse = refuse
         self._since = time.monotonic()
         self._sent = self._heard = 0
+        self._met = -RECENT  # monotonic time when another was heard last [s]
         profile = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
         entities.subscription(FaultFlag, 'fault_flag', self._hear, profile)
+
+    @property
+    def problem(self) -> str:
+        """That another detector judges this valve too, '' if none does."""
+        if time.monotonic() - self._met > RECENT:
+            return ''
+        return 'another detector judges this valve too: end one of them'
 
     def sent(self) -> None:
         """Note that the node itself has sent a flag."""
@@ -42,6 +51,7 @@ class RivalWatch:
         if self._heard <= self._sent:
             return
         self._heard = self._sent
+        self._met = time.monotonic()
         topic = self._node.resolve_topic_name('fault_flag')
         cause = (
             f'another detector sends on {topic}: give each valve a namespace of its own '

@@ -1,0 +1,122 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""An error in a callback ends neither the node nor its process, and is told."""
+
+import time
+
+import pytest
+import rclpy
+from damadics_fd.ros import own_services
+from damadics_fd.ros.entities import Entities
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
+from rclpy.context import Context
+from rclpy.experimental import EventsExecutor
+from rclpy.lifecycle import LifecycleNode
+from rclpy.qos import QoSProfile
+from std_msgs.msg import Int32
+from std_srvs.srv import Trigger
+
+pytestmark = pytest.mark.ros
+PROFILE = QoSProfile(depth=100)
+
+
+@pytest.fixture
+def node(monkeypatch):
+    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    context = Context()
+    rclpy.init(context=context, domain_id=94)
+    node = LifecycleNode('contained', context=context)
+    own_services.contain(node)
+    executor = EventsExecutor(context=context)
+    executor.add_node(node)
+
+    def wait(condition, patience=20.0):
+        deadline = time.monotonic() + patience
+        while not condition() and time.monotonic() < deadline:
+            executor.spin_once(timeout_sec=0.05)
+        return condition()
+
+    node.wait = wait
+    yield node
+    executor.shutdown()
+    node.destroy_node()
+    context.try_shutdown()
+
+
+def test_a_timer_that_fails_goes_on_and_is_told(node):
+    entities, calls = Entities(node), []
+
+    def act():
+        calls.append(1)
+        if len(calls) < 3:
+            raise ValueError('not now')
+
+    entities.timer(0.01, act)
+    assert node.wait(lambda: entities.problem)
+    assert 'ValueError: not now (act, line' in entities.problem
+    assert node.wait(lambda: len(calls) >= 4)
+    assert entities.problem == ''
+    entities.release()
+
+
+def test_a_subscription_that_fails_takes_the_next_message(node):
+    entities, got = Entities(node), []
+
+    def take(message):
+        if message.data == 1:
+            raise KeyError('x')
+        got.append(message.data)
+
+    publisher = entities.publisher(Int32, 'number', PROFILE)
+    entities.subscription(Int32, 'number', take, PROFILE)
+    publisher.publish(Int32(data=1))
+    assert node.wait(lambda: entities.fails('number'))
+    publisher.publish(Int32(data=2))
+    assert node.wait(lambda: got == [2])
+    assert not entities.fails('number')
+    entities.release()
+
+
+def test_a_service_that_fails_answers_without_success(node):
+    entities = Entities(node)
+
+    def serve(request, response):
+        response.message = 'half done'
+        raise RuntimeError('broken')
+
+    entities.service(Trigger, 'broken', serve)
+    client = node.create_client(Trigger, 'broken')
+    assert node.wait(client.service_is_ready)
+    future = client.call_async(Trigger.Request())
+    assert node.wait(future.done)
+    assert not future.result().success
+    assert 'broken' in entities.problem
+    entities.release()
+
+
+def test_what_is_queued_for_a_released_entity_does_nothing(node):
+    entities, calls = Entities(node), []
+    timer = entities.timer(0.001, lambda: calls.append(timer.timer_period_ns))
+    publisher = entities.publisher(Int32, 'number', PROFILE)
+    entities.subscription(Int32, 'number', lambda m: entities.release(), PROFILE)
+    for n in range(50):
+        publisher.publish(Int32(data=n))
+    assert node.wait(lambda: not entities._alive)
+    before = len(calls)
+    node.wait(lambda: False, 0.5)
+    assert len(calls) == before
+    assert entities.problem == ''
+    assert 'number' not in dict(node.get_topic_names_and_types())
+
+
+@pytest.mark.parametrize('number', [3, 4, 200, 255])
+def test_a_transition_that_does_not_fit_is_answered_and_changes_nothing(node, number):
+    client = node.create_client(ChangeState, 'contained/change_state')
+    assert node.wait(client.service_is_ready)
+    future = client.call_async(ChangeState.Request(transition=Transition(id=number)))
+    assert node.wait(future.done), 'no answer'
+    assert not future.result().success
+    future = client.call_async(ChangeState.Request(transition=Transition(id=1)))
+    assert node.wait(future.done)
+    assert future.result().success, 'the life cycle is out of step'
