@@ -6,9 +6,9 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import yaml
+from damadics_fd.core.record import Plain, Saved
 
 NAME = re.compile(r'[a-z][a-z0-9_]*(/[a-z][a-z0-9_]*)*')
 TOPICS = (
@@ -35,11 +35,11 @@ class Valve:
 
     name: str
     parameters: Path | None = None
-    settings: Mapping[str, Any] = field(default_factory=dict)
+    settings: Mapping[str, Plain] = field(default_factory=dict)
     topics: Mapping[str, str] = field(default_factory=dict)
-    simulate: Mapping[str, Any] = field(default_factory=dict)
+    simulate: Mapping[str, Plain] = field(default_factory=dict)
 
-    def settings_of(self, node: str) -> dict[str, Any]:
+    def settings_of(self, node: str) -> Saved:
         """
         Return the settings of one node of the valve.
 
@@ -100,13 +100,13 @@ def spread(valves: list[Valve], processes: int) -> dict[str, list[Valve]]:
     return {f'monitors_{n + 1}': valves[n::processes] for n in range(min(processes, len(valves)))}
 
 
-def _valve(path: Path, name: str, entry: Any, problems: list[str]) -> Valve:
+def _valve(path: Path, name: str, entry: Plain, problems: list[str]) -> Valve:
     if not NAME.fullmatch(name):
         problems.append(f'{name}: a name consists of small letters, digits and _, such as lv101')
     if not isinstance(entry, dict):
         problems.append(f'{name}: give a mapping with {", ".join(ENTRIES)}')
         return Valve(name)
-    given: dict[str, Any] = {}
+    given: Saved = {}
     for key, value in entry.items():
         kind = ENTRIES.get(key)
         if kind is None:
@@ -115,14 +115,26 @@ def _valve(path: Path, name: str, entry: Any, problems: list[str]) -> Valve:
             problems.append(f'{name}: {key} is not a {"text" if kind is str else "mapping"}')
         else:
             given[key] = value
-    for topic in given.get('topics', {}):
+    topics = _mapping(given.get('topics'))
+    for topic in topics:
         if topic not in TOPICS:
             problems.append(f'{name}: there is no topic {topic}; there are {", ".join(TOPICS)}')
+    parameters = None
     if 'parameters' in given:
-        given['parameters'] = (path.parent / given['parameters']).expanduser()
-        if not given['parameters'].is_file():
-            problems.append(f'{name}: {given["parameters"]} does not exist')
-    return Valve(name, **given)
+        parameters = (path.parent / str(given['parameters'])).expanduser()
+        if not parameters.is_file():
+            problems.append(f'{name}: {parameters} does not exist')
+    return Valve(
+        name,
+        parameters,
+        _mapping(given.get('settings')),
+        {topic: str(place) for topic, place in topics.items()},
+        _mapping(given.get('simulate')),
+    )
+
+
+def _mapping(entry: Plain) -> Saved:
+    return entry if isinstance(entry, dict) else {}
 
 
 def _shared(valves: list[Valve]) -> list[str]:
@@ -130,7 +142,7 @@ def _shared(valves: list[Valve]) -> list[str]:
     owner: dict[str, str] = {}
     problems = []
     for valve in valves:
-        reference = valve.settings.get('reference')
+        reference = str(valve.settings.get('reference') or '')
         if reference and reference in owner:
             problems.append(f'{valve.name}: {owner[reference]} has the reference {reference} too')
         elif reference:

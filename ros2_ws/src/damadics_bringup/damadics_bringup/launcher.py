@@ -9,9 +9,9 @@ import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from ament_index_python.packages import get_package_share_directory
+from damadics_fd.core.record import Saved
 from damadics_fd.ros.arguments import command_parser, state_folder
 from damadics_fd.start import missing_middleware
 from damadics_fd.store.access import AccessError
@@ -33,7 +33,7 @@ FOREVER = 1e8  # s of simulated time
 
 
 def arguments_of(
-    parameters: dict[str, Any],
+    parameters: Saved,
     *,
     namespace: str = '',
     file: Path | None = None,

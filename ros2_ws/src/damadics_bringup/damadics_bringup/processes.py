@@ -15,10 +15,10 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from types import TracebackType
-from typing import Any
 
 import yaml
 from ament_index_python.packages import PackageNotFoundError, get_package_prefix
+from damadics_fd.core.record import Plain
 
 PR_SET_PDEATHSIG = 1  # prctl(2)
 _LIBC = ctypes.CDLL(None) if sys.platform == 'linux' else None
@@ -77,7 +77,7 @@ def executable(package: str, name: str) -> str:
     return str(path)
 
 
-def parameters(**values: object) -> list[str]:
+def parameters(**values: Plain) -> list[str]:
     """
     Write parameters as a node's command line takes them.
 
@@ -90,7 +90,7 @@ def parameters(**values: object) -> list[str]:
     return ['--ros-args', *assignments(values)]
 
 
-def assignments(values: Mapping[str, Any]) -> list[str]:
+def assignments(values: Mapping[str, Plain]) -> list[str]:
     """
     Write parameters as YAML values, so that a text stays a text.
 
@@ -106,7 +106,7 @@ def assignments(values: Mapping[str, Any]) -> list[str]:
     return words
 
 
-def _is_plain(value: Any) -> bool:
+def _is_plain(value: Plain) -> bool:
     """Tell whether YAML reads a text as it is."""
     try:
         return isinstance(value, str) and yaml.safe_load(value) == value
