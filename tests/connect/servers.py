@@ -59,6 +59,7 @@ class Server:
             )
         ready = lambda: listens(self.port) or self._process.poll() is not None  # noqa: E731
         if not wait_for(ready, 60.0):
+            self.kill()
             pytest.fail(f'{self._command} does not listen')
         assert self._process.poll() is None, self._log.read_text(errors='replace')[-2000:]
 

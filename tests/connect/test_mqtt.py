@@ -191,8 +191,7 @@ def test_a_wrong_password_is_told_without_it(processes, domain, tmp_path):
         {'broker': f'mqtt://127.0.0.1:{server.port}', 'user': user, 'out': {'prefix': 'fd'}},
     )
     log = processes.log('mqtt')
-    assert wait_for(lambda: 'wrong user name or password' in log.read_text(), 30.0), (
-        log.read_text()
-    )
-    assert 'correct horse' not in log.read_text() and 'Traceback' not in log.read_text()
+    told = wait_for(lambda: 'wrong user name or password' in log.read_text(), 30.0)
     server.kill()
+    assert told, log.read_text()
+    assert 'correct horse' not in log.read_text() and 'Traceback' not in log.read_text()
