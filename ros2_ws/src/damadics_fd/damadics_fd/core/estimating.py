@@ -8,9 +8,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from damadics_fd.core.approximator.estimator import Estimator
 from damadics_fd.core.approximator.state import Estimate
 from damadics_fd.core.quality import Refused
 from damadics_fd.core.record import Array, Floats, Ints, Plain, Saved
+from damadics_fd.core.scada.estimator import ScadaEstimator
 from damadics_fd.core.settings import Settings
 
 
@@ -89,3 +91,13 @@ class Estimating(Protocol):
     @property
     def last_stamp(self) -> int:
         """Return the stamp of the last accepted sample."""
+
+
+def estimator_for(settings: Settings) -> Estimating:
+    """
+    Return the estimator of a mode.
+
+    :param settings: all settings.
+    :return: the approximator, or the models and tests of mode `scada`.
+    """
+    return ScadaEstimator(settings) if settings.mode == 'scada' else Estimator(settings)

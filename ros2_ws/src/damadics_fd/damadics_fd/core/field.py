@@ -154,7 +154,7 @@ class SettingsError(ValueError):
         super().__init__('; '.join(problems))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Section:
     """
     Hold settings that belong together; a compiled step reads them from `record()`.
@@ -192,19 +192,27 @@ class Section:
 
         :return: structured array of length 1: the numbers, switches, tables and derived numbers.
         """
-        values = {name: getattr(self, name) for name in self._numbers()}
-        columns = [(name, KINDS[type(value)], np.shape(value)) for name, value in values.items()]
-        array = np.zeros(1, np.dtype((np.record, np.dtype(columns, align=True))))
-        for name, value in values.items():
-            array[name] = value
+        kind = type(self)
+        dtype = _layouts.get(kind)
+        if dtype is None:
+            values = [(name, getattr(self, name)) for name in _numbers(kind)]
+            columns = [(name, KINDS[type(value)], np.shape(value)) for name, value in values]
+            dtype = _layouts[kind] = np.dtype((np.record, np.dtype(columns, align=True)))
+        array = np.zeros(1, dtype)
+        array[0] = tuple([getattr(self, name) for name in dtype.names or ()])
         return array
 
-    def _numbers(self) -> Iterator[str]:
-        for item in fields(self):
-            if item.type is not str:
-                yield item.name
-        for kind in reversed(type(self).__mro__):
-            yield from vars(kind).get('DERIVED', ())
+
+_layouts: dict[type[Section], np.dtype[np.void]] = {}
+
+
+def _numbers(kind: type[Section]) -> Iterator[str]:
+    """Return the names of what compiled code can read."""
+    for item in fields(kind):
+        if item.type is not str:
+            yield item.name
+    for base in reversed(kind.__mro__):
+        yield from vars(base).get('DERIVED', ())
 
 
 def wrong_choice(name: str, value: Value, options: tuple[str, ...]) -> str:

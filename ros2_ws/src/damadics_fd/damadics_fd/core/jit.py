@@ -23,13 +23,20 @@ CORE = Path(__file__).parent
 
 
 @lru_cache
+def _core() -> bytes:
+    """Return the sources of the core, read once for all its rooms."""
+    return b''.join(source.read_bytes() for source in sorted(CORE.rglob('*.py')))
+
+
+@lru_cache
 def _cache(folder: Path) -> str:
     # numba's own cache notices a change of the function's file, but not of the files of the
     # functions that it calls: a loop would go on with the steps of yesterday. So every state
     # of the sources has a cache of its own.
-    digest = hashlib.sha256()
-    for source in sorted({*CORE.rglob('*.py'), *folder.rglob('*.py')}):
-        digest.update(source.read_bytes())
+    digest = hashlib.sha256(_core())
+    if not folder.is_relative_to(CORE):
+        for source in sorted(folder.rglob('*.py')):
+            digest.update(source.read_bytes())
     kept = folder / '__pycache__' / f'numba-{digest.hexdigest()[:16]}'
     return str(kept if writable(kept) else _private(kept))
 

@@ -7,16 +7,14 @@ from typing import Protocol, Self
 
 import numpy as np
 
-from damadics_fd.core.approximator.estimator import Estimator
 from damadics_fd.core.approximator.state import Estimate
 from damadics_fd.core.decision.detector import Detector
 from damadics_fd.core.decision.events import Decision, Event
-from damadics_fd.core.estimating import Estimating
+from damadics_fd.core.estimating import Estimating, estimator_for
 from damadics_fd.core.quality import REASONS, Refused
 from damadics_fd.core.record import Plain, Saved
 from damadics_fd.core.result import Columns, Result, contiguous, events_in, hold_refused
 from damadics_fd.core.sample import Sample
-from damadics_fd.core.scada.estimator import ScadaEstimator
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.signature.signature import Signature
 from damadics_fd.core.signature.state import NO_CLASSES
@@ -73,16 +71,6 @@ class Monitor(Protocol):
 
         :return: for people; never "monitoring" while it does not monitor.
         """
-
-
-def estimator_for(settings: Settings) -> Estimating:
-    """
-    Return the estimator of a mode.
-
-    :param settings: all settings.
-    :return: the approximator, or the models and tests of mode `scada`.
-    """
-    return ScadaEstimator(settings) if settings.mode == 'scada' else Estimator(settings)
 
 
 class Chain:

@@ -204,7 +204,7 @@ def check_stamp(q: Quality, c: Settings, stamp: int) -> int:
 
 
 @jit
-def admit(q: Quality, c: Settings, stamp: int, reason: int) -> float:
+def admit(q: Quality, c: Settings, stamp: int, reason: int) -> tuple[float, bool]:
     """
     Count a judged sample and return its time step.
 
@@ -212,23 +212,24 @@ def admit(q: Quality, c: Settings, stamp: int, reason: int) -> float:
     :param c: settings record.
     :param stamp: stamp [ns].
     :param reason: result of the checks.
-    :return: time since the last accepted sample [s]; 0 for a refused one; the nominal step,
-        negative, where the filters have to start afresh.
+    :return: time since the last accepted sample [s], the nominal step where the filters have to
+        start afresh, 0 for a refused sample; whether they have to.
     """
     q.counts[reason] += 1
     if reason != ACCEPTED:
         q.refused_in_a_row += 1
-        return 0.0
+        return 0.0, False
     q.refused_in_a_row = 0
-    dt = -c.dt
+    dt, afresh = c.dt, True
     if q.started:
+        afresh = False
         dt = (stamp - q.stamp) * 1e-9
         if dt > 1.5 * c.dt:
             q.gaps += 1
             q.missed += int(dt * c.sample_rate + 0.5) - 1
         if dt > c.gap_reset:
             q.restarts += 1
-            dt = -c.dt
+            dt, afresh = c.dt, True
     q.started = True
     q.stamp = stamp
-    return dt
+    return dt, afresh

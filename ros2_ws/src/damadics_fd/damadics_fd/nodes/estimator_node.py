@@ -18,7 +18,7 @@ from damadics_fd.core.decision.alarm import (
     NORMAL,
     OUT_OF_SPECIFICATION,
 )
-from damadics_fd.core.monitor import estimator_for
+from damadics_fd.core.estimating import estimator_for
 from damadics_fd.core.quality import Reason, Refused
 from damadics_fd.nodes.frozen_position import FrozenPosition
 from damadics_fd.nodes.managed import MonitoringNode

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 from damadics_fd.commands.replay import replay
-from damadics_fd.core.monitor import estimator_for, run
+from damadics_fd.core.estimating import estimator_for
+from damadics_fd.core.monitor import run
 from damadics_fd.core.settings import Settings
 from damadics_fd.store.references import Reference, save_reference
 from damadics_plant import simulate

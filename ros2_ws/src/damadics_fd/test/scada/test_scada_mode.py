@@ -9,8 +9,9 @@ import math
 import numpy as np
 import pytest
 from damadics_fd.core.approximator.estimator import Estimator
+from damadics_fd.core.estimating import estimator_for
 from damadics_fd.core.modes import PHASE_LEARN_PHI, PHASE_MONITOR
-from damadics_fd.core.monitor import estimator_for, run
+from damadics_fd.core.monitor import run
 from damadics_fd.core.quality import Refused
 from damadics_fd.core.scada.estimator import ScadaEstimator
 from damadics_fd.core.settings import Settings

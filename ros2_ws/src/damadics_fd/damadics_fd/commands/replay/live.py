@@ -30,6 +30,7 @@ from damadics_fd.core.sample import SIGNALS, Sample
 from damadics_fd.nodes.signature_publisher import SignaturePublisher
 from damadics_fd.ros import qos
 from damadics_fd.ros.conversions import event_message, set_stamp, write_estimate, write_flag
+from damadics_fd.ros.entities import Entities
 
 CLOCK_PERIOD = 0.01  # [s] of wall time between two messages on /clock
 HEARTBEAT = 10**9  # [ns] of scenario time between two flags without change
@@ -55,7 +56,13 @@ class Judgements:
         self._flag = node.create_publisher(FaultFlag, 'fault_flag', qos.FLAG)
         self._event = node.create_publisher(FaultEvent, 'fault_event', qos.EVENTS)
         self._signature = SignaturePublisher(
-            node, monitor.signature, tag, monitor.settings, None, self._causes.limits
+            node,
+            Entities(node),
+            monitor.signature,
+            tag,
+            monitor.settings,
+            None,
+            self._causes.limits,
         )
         self._shown: tuple[tuple[bool, int, int], int] | None = None
 

@@ -30,8 +30,8 @@ from damadics_fd.commands.replay.output import (
     print_table,
     write_outcomes,
 )
+from damadics_fd.core.estimating import estimator_for
 from damadics_fd.core.modes import MODES
-from damadics_fd.core.monitor import estimator_for
 from damadics_fd.core.settings import Settings, SettingsError
 from damadics_fd.core.settings.document import parameters_in
 from damadics_fd.ros.arguments import command_parser, split_ros_args

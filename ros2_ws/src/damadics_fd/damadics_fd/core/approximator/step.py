@@ -16,7 +16,7 @@ from damadics_fd.core.settings import Settings
 from damadics_fd.core.valve import force
 
 SUBSTEPS = 1000  # at most, in one gap
-LARGEST_K2_DT = 1.5  # step of the printed observer, which is unstable from 2.8 on
+LARGEST_PART = 1.5  # of a sample period, and of 1/k2: the printed observer is unstable from 2.8 on
 
 
 @layer
@@ -89,16 +89,14 @@ def step(
     if reason == quality.ACCEPTED:
         reason = quality.check_stamp(q, c, stamp)
     first = q.counts[quality.ACCEPTED] == 0
-    dt = quality.admit(q, c, stamp, reason)
+    dt, afresh = quality.admit(q, c, stamp, reason)
     if reason != quality.ACCEPTED:
         return reason
 
-    afresh = dt < 0.0
     if c.ps_lag > 0.0:
-        x1, p1, p2 = transmitter.delay(s, c, afresh, abs(dt), x1, p1, p2)
+        x1, p1, p2 = transmitter.delay(s, c, afresh, dt, x1, p1, p2)
     y = x1 + c.spring_origin
     if afresh:
-        dt = -dt
         velocity.restart(s, y)
         observer.restart(s, y)
         if first:
@@ -121,17 +119,20 @@ def step(
         dt = 0.0 if c.mode_code == PAPER else dt
 
     phase = learning.phase_of(s, c)
-    parts = max(1, int(dt * c.sample_rate / 1.5) + 1)
+    periods = dt * c.sample_rate
     if c.mode_code == PAPER:
-        parts = max(parts, int(dt * c.k2 / LARGEST_K2_DT) + 1)
-    parts = min(parts, SUBSTEPS)
+        periods = max(periods, dt * c.k2)
+    parts = 1 if periods < LARGEST_PART else min(int(periods / LARGEST_PART) + 1, SUBSTEPS)
+    length = dt / parts if parts > 1 else dt  # a division saved nearly always
     x1_0, x2_0, u_0 = x1_before, x2_before, u_before
     for i in range(1, parts + 1):  # a gap is bridged on straight lines between filtered signals
-        part = i / parts
-        x1_1 = x1_before + part * (s.x1 - x1_before) if i < parts else s.x1
-        x2_1 = x2_before + part * (s.x2 - x2_before) if i < parts else s.x2
-        u_1 = u_before + part * (s.u - u_before) if i < parts else s.u
-        advance(s, c, phase, dt / parts, x1_0, x2_0, u_0, x1_1, x2_1, u_1)
+        x1_1, x2_1, u_1 = s.x1, s.x2, s.u
+        if i < parts:
+            part = i / parts
+            x1_1 = x1_before + part * (s.x1 - x1_before)
+            x2_1 = x2_before + part * (s.x2 - x2_before)
+            u_1 = u_before + part * (s.u - u_before)
+        advance(s, c, phase, length, x1_0, x2_0, u_0, x1_1, x2_1, u_1)
         x1_0, x2_0, u_0 = x1_1, x2_1, u_1
 
     learning.follow(s, c, phase, dt)

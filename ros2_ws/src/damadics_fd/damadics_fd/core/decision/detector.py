@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damadics_fd.core.approximator.state import Estimate
-from damadics_fd.core.decision import alarm
+from damadics_fd.core.decision import alarm, requests
 from damadics_fd.core.decision import saved as saved_state
 from damadics_fd.core.decision.events import Decision, Event
 from damadics_fd.core.decision.judge import State, judge, show
@@ -80,7 +80,7 @@ class Detector:
         :return: the decision; its `events` are the transitions of the alarm at this sample.
         """
         self._estimate[0] = _VALUES(estimate)
-        self._judge(ACCEPTED, self._estimate, self._rows, True, 0)
+        self.judge(ACCEPTED, self._estimate, self._rows)
         return self.decision
 
     def judge(
@@ -102,20 +102,6 @@ class Detector:
         :param first: row to begin with.
         :return: the row after the last one, and the number of decisions with a transition.
         """
-        done, kept = self._judge(reason, estimates, decisions, keep, first)
-        judged = np.flatnonzero(reason[first:done] == 0)
-        if len(judged):
-            self._estimate[0] = estimates[first + judged[-1]]
-        return done, kept
-
-    def _judge(
-        self,
-        reason: NDArray[np.uint8],
-        estimates: Array,
-        decisions: Array,
-        keep: bool,
-        first: int,
-    ) -> tuple[int, int]:
         return judge(
             self.state,
             self._settings,
@@ -124,6 +110,7 @@ class Detector:
             reason,
             estimates,
             decisions,
+            self._estimate,
             self._decision,
             keep,
             first,
@@ -159,7 +146,7 @@ class Detector:
         :param occurrence: number of the alarm; the present one where it is None.
         :return: whether it was done, a sentence, and the events.
         """
-        return self._outcome(alarm.acknowledge(self.state[0], occurrence))
+        return self._outcome(requests.acknowledge(self.state[0], occurrence))
 
     def reset_alarm(self) -> Outcome:
         """
@@ -167,7 +154,7 @@ class Detector:
 
         :return: whether it was done, a sentence, and the events.
         """
-        return self._outcome(alarm.reset(self.state[0]))
+        return self._outcome(requests.reset(self.state[0]))
 
     def shelve(self, seconds: float) -> Outcome:
         """
@@ -176,7 +163,7 @@ class Detector:
         :param seconds: how long, counted in stamps of the measurement.
         :return: whether it was done, a sentence, and the events.
         """
-        return self._outcome(alarm.shelve(self.state[0], seconds))
+        return self._outcome(requests.shelve(self.state[0], seconds))
 
     def unshelve(self) -> Outcome:
         """
@@ -184,7 +171,7 @@ class Detector:
 
         :return: whether it was done, a sentence, and the events.
         """
-        return self._outcome(alarm.unshelve(self.state[0]))
+        return self._outcome(requests.unshelve(self.state[0]))
 
     def save(self) -> Saved:
         """
@@ -210,10 +197,10 @@ class Detector:
     def lose(self) -> None:
         """Begin afresh where the state of before is lost: shown until a person has seen it."""
         self.reset()
-        alarm.lose(self.state[0])
+        requests.lose(self.state[0])
         self._show(0)
 
-    def _outcome(self, answer: alarm.Answer) -> Outcome:
+    def _outcome(self, answer: requests.Answer) -> Outcome:
         if not answer.transitions:
             return Outcome(answer.done, answer.text, ())
         self._show(answer.transitions)

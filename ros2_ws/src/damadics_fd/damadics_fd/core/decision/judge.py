@@ -141,9 +141,10 @@ def judge(
     g: Array,
     gc: Array,
     reason: NDArray[np.uint8],
-    e: Rows[Estimate],
-    d: Array,
-    latest: Rows[Decision],
+    e: Array,
+    d: Rows[Decision],
+    judged: Array,
+    latest: Array,
     keep: bool,
     first: int,
 ) -> tuple[int, int]:
@@ -157,31 +158,33 @@ def judge(
     :param reason: 0 where there is an estimate.
     :param e: estimates.
     :param d: decisions, written where there is an estimate.
-    :param latest: the last decision, in an array of length 1, written.
+    :param judged: the last estimate, in an array of length 1, written.
+    :param latest: the decision on it, likewise.
     :param keep: keep a row for each; otherwise only decisions with a transition, as many as
         there is room for.
     :param first: row to begin with.
     :return: the row after the last one, and the number of decisions with a transition.
     """
     kept = 0
-    last = -1
+    last = row = -1
     done = len(e)
     for i in range(first, len(e)):
         if reason[i] != 0:
             continue
-        last = i
-        step(s[0], c[0], g[0], gc[0], e[i], latest[0])
-        news = latest[0].transitions != 0
+        last, row = i, i if keep else kept
+        step(s[0], c[0], g[0], gc[0], e[i], d[row])
+        news = d[row].transitions != 0
         if keep or news:
-            report(s[0], g[0], gc[0], e[i], latest[0])
-            d[i if keep else kept] = latest[0]
+            report(s[0], g[0], gc[0], e[i], d[row])
         if news:
             kept += 1
             if not keep and kept == len(d):
                 done = i + 1
                 break
-    if last >= 0 and not keep:
-        report(s[0], g[0], gc[0], e[last], latest[0])
+    if last >= 0:
+        report(s[0], g[0], gc[0], e[last], d[row])
+        judged[0] = e[last]
+        latest[0] = d[row]
     return done, kept
 
 

@@ -6,7 +6,8 @@ import math
 import reprlib
 from collections.abc import Mapping
 
-from damadics_fd.core.decision.alarm import FAILURE, LONGEST_SHELF
+from damadics_fd.core.decision.alarm import FAILURE
+from damadics_fd.core.decision.requests import LONGEST_SHELF
 from damadics_fd.core.record import Plain, Saved
 
 LATEST = 2**31 * 10**9  # ns; what fits into the stamp of a message

@@ -11,7 +11,7 @@ VELOCITIES = ('high_pass', 'kalman', 'super_twisting')
 THRESHOLDS = ('paper', 'floor')
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Approximation(Section):
     """Tune equations (10)-(16) and the velocity they work on."""
 

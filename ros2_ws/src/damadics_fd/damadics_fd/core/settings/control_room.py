@@ -9,7 +9,7 @@ from damadics_fd.core.field import Section, number
 SCADA = ('scada',)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class ControlRoom(Section):
     """Tune the monitor of a control room's signals."""
 

@@ -9,7 +9,7 @@ from damadics_fd.core.field import Section, number, switch, whole
 GATING = ('monitor', 'scada')
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Deciding(Section):
     """Tune when a residual becomes an alarm, and how long it stays one."""
 

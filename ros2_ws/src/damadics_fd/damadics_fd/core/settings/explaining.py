@@ -9,7 +9,7 @@ from damadics_fd.core.field import Section, number, switch
 MONITOR = ('monitor',)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Explaining(Section):
     """Tune the valve signature, which needs ps and tells friction, spring and sensors apart."""
 

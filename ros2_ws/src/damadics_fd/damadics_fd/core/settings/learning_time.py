@@ -10,7 +10,7 @@ LEARNING = ('monitor', 'scada')
 MONITOR = ('monitor',)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class LearningTime(Section):
     """Tune how long is learned and what the valve has to show meanwhile."""
 

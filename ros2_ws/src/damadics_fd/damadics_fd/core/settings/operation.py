@@ -11,7 +11,7 @@ from damadics_fd.core.modes import MODES
 HOLDING = ('monitor', 'scada')
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Operation(Section):
     """Say how samples come and which monitor takes them."""
 

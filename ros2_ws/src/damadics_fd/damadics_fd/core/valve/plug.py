@@ -19,25 +19,12 @@ _LAST = len(POSITION) - 1
 
 
 @jit
-def segment(x: float) -> int:
-    """
-    Return the part of the table in which a position lies.
-
-    :param x: position [1].
-    :return: index of the node before it, 0..10; a node belongs to the part that ends with it.
-    """
-    if x > 0.99:
-        return 10
-    i = min(max(int(x * 10.0), 0), 9)
-    if i > 0 and x <= _NODES[i]:
-        i -= 1
-    return i
-
-
-@jit
 def recovery(table: Rows[float], x: float) -> float:
     """
     Interpolate K_m; constant beyond the ends of the stroke.
+
+    The nodes are regular but for the last, so that no search is needed; a node belongs to the
+    part of the table that ends with it.
 
     :param table: K_m at `POSITION`.
     :param x: position [1], 0 open, 1 closed.
@@ -50,7 +37,9 @@ def recovery(table: Rows[float], x: float) -> float:
         return float(table[0])
     if x >= 1.0:
         return float(table[_LAST])
-    i = segment(x)
+    i = 10 if x > 0.99 else int(x * 10.0)
+    if x <= _NODES[i]:
+        i -= 1
     return between(x, _NODES[i], _NODES[i + 1], table[i], table[i + 1])
 
 
