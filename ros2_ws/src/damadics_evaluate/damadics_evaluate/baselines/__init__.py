@@ -5,7 +5,7 @@
 from damadics_evaluate.baselines.classifiers import Forest, Network
 from damadics_evaluate.baselines.coherency import Coherency
 from damadics_evaluate.baselines.drift import Adwin, PageHinkley
-from damadics_evaluate.baselines.kalman import InnovationEkf
+from damadics_evaluate.baselines.innovation import InnovationEkf
 from damadics_evaluate.baselines.multivariate import IsolationForest, PrincipalComponents
 from damadics_evaluate.baselines.narx import NarxHotelling
 from damadics_evaluate.baselines.residuals import (

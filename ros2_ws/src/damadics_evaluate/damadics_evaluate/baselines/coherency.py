@@ -25,7 +25,7 @@ class Coherency(Detector):
 
     name, title = 'coherency', 'squared coherency of CV and X (scipy)'
 
-    def __init__(self, window: int = 256, segment: int = 64, every: int = 4) -> None:
+    def __init__(self, window: int = 256, segment: int = 64, every: int = 8) -> None:
         self.window = window
         self.segment = segment
         self.every = every

@@ -1,83 +1,19 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Extended Kalman filters: innovation test, and friction and spring as states (filterpy)."""
+"""Extended Kalman filter with friction and spring as states (filterpy)."""
 
 import math
 from typing import Any
 
 import numpy as np
-from damadics_fd.core.scada.actuator import nominal_flow
 from damadics_fd.core.valve.parameters import Valve
 from damadics_fd.core.valve.plug import RECOVERY, recovery
 
 from damadics_evaluate.columns import Floats
-from damadics_evaluate.detectors.base import CV, P1, P2, T1, Detector, F, X, require
+from damadics_evaluate.detectors.base import require
 
 ACT = Valve()
 KM = np.array(RECOVERY)
-
-
-class InnovationEkf(Detector):
-    """
-    Normalised innovation squared of an EKF on X' and F', averaged over a window.
-
-    The stem is x(k) = w0 + w1 x(k-1) + w2 CV(k) + w3 CV(k-1), fitted to the fault-free hour, with
-    a slowly varying bias as second state; F' is the nominal valve equation.
-    """
-
-    name, title = 'ekf', 'EKF innovation (filterpy)'
-
-    def __init__(self, window: int = 5, bias_noise: float = 1e-5) -> None:
-        self.window = window
-        self.bias_noise = bias_noise
-        self._record = ACT.record()[0]
-
-    def fit(self, hour: Floats) -> None:
-        """Fit stem dynamics and noise."""
-        rows = self.learning_rows(hour)
-        design = np.column_stack(
-            [np.ones(len(rows) - 1), rows[:-1, X], rows[1:, CV], rows[:-1, CV]]
-        )
-        self._w = np.linalg.lstsq(design, rows[1:, X], rcond=None)[0]
-        error = rows[1:, X] - design @ self._w
-        self._q = float(error.var())
-        f = np.array([self._flow(*row) for row in rows[:, (X, P1, P2, T1)]])
-        self._r = np.diag([0.2 * self._q, float(np.nanvar(rows[:, F] - f))])
-        self._offset = float(np.nanmean(rows[:, F] - f))
-
-    def _flow(self, x: float, p1: float, p2: float, t1: float) -> float:
-        return float(nominal_flow(self._record, x, p1, p2, t1))
-
-    def statistic(self, samples: Floats) -> Floats:
-        """Return the windowed mean of the normalised innovation squared."""
-        kalman = require('filterpy.kalman', self.name)
-        ekf = kalman.ExtendedKalmanFilter(2, 2)
-        ekf.x = np.array([[samples[0, X]], [0.0]])
-        ekf.P = np.diag([self._q, 1e-6])
-        ekf.F = np.array([[self._w[1], 1.0], [0.0, 1.0]])
-        ekf.Q = np.diag([self._q, self.bias_noise**2])
-        ekf.R = self._r
-        nis = np.zeros(len(samples))
-        drive = self._w[0] + self._w[2] * samples[1:, CV] + self._w[3] * samples[:-1, CV]
-        for i in range(1, len(samples)):
-            row = samples[i]
-            x = self._w[1] * ekf.x[0, 0] + ekf.x[1, 0] + drive[i - 1]
-            bias = ekf.x[1, 0]
-            ekf.x = np.array([[x], [bias]])
-            ekf.P = ekf.F @ ekf.P @ ekf.F.T + ekf.Q
-            inputs = float(row[P1]), float(row[P2]), float(row[T1])
-            f = self._flow(x, *inputs)
-            slope = (self._flow(x + 0.01, *inputs) - self._flow(x - 0.01, *inputs)) / 0.02
-            jacobian = np.array([[1.0, 0.0], [slope, 0.0]])
-            expected = np.array([[x], [f + self._offset]])
-            ekf.update(
-                np.array([[row[X]], [row[F]]]),
-                lambda _, j=jacobian: j,
-                lambda _, h=expected: h,
-            )
-            nis[i] = float((ekf.y.T @ ekf.SI @ ekf.y)[0, 0])
-        mean = np.convolve(nis, np.full(self.window, 1.0 / self.window))[: len(nis)]
-        return np.where(self.active(samples), mean, 0.0)
 
 
 class FrictionSpringEkf:

@@ -37,8 +37,6 @@ class Features:
         :return: one row per window; the k-th ends with sample WINDOW - 1 + k STEP.
         """
         plain = self._plain(np.nan_to_num(samples))
-        if len(plain) < WINDOW:
-            return np.empty((0, plain.shape[1]))
         return np.asarray(np.clip((plain - self._mean) / self._scale, -50.0, 50.0))
 
     def _plain(self, rows: Floats) -> Floats:
