@@ -10,7 +10,7 @@ from damadics_fd.core.stamps import SECOND, is_date
 LEAST_MAX_AGE = 2.0  # s
 PERIODS = 3.0  # sample periods; slower samples are that old by nature
 BACK = 1.0  # s that stamps may be out of order without being another run
-INTERRUPTED = 0.5  # s without a sample, after which a source of simulated stamps may have paused
+INTERRUPTED = 0.3  # s without a sample, after which a source of simulated stamps may have paused
 WINDOW = 2.0  # s; two of them with the same delay after it say that it has
 EVEN = 0.1  # s
 JUMP = 60.0  # s that a stamp may run ahead of the time that has passed
