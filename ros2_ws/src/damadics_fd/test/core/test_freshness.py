@@ -71,7 +71,7 @@ def test_a_source_that_was_paused_is_fresh_again_after_a_while():
     for n in range(200):
         fresh.heard(n * PERIOD, n / 200)
     for n in range(200, 1200):
-        now = 10.0 + n / 200 + rng.exponential(0.05)
+        now = 10.0 + n / 200 + rng.exponential(0.02)
         fresh.heard(n * PERIOD, now)
         if n < 900:
             assert fresh.age(0, now) > 9.0, 'not before it is certain'
