@@ -15,6 +15,12 @@ SCALARS = tuple(
     name for name in Estimate.names() if name not in ('stamp', 'alpha1', 'alpha4', 'alpha5')
 )
 
+EVENT_FIELDS = tuple(  # that event and message have in common, but for the stamps
+    name
+    for name in FaultEvent.get_fields_and_field_types()
+    if name in Event.__dataclass_fields__ and name != 'onset'
+)
+
 
 def nanoseconds(time: Time) -> int:
     """
@@ -104,19 +110,6 @@ def event_message(event: Event, frame_id: str) -> FaultEvent:
     message.header.frame_id = frame_id
     set_stamp(message.header.stamp, event.stamp)
     set_stamp(message.onset, event.onset)
-    for name in (
-        'transition',
-        'occurrence',
-        'level',
-        'residual',
-        'threshold',
-        'ratio',
-        'duration',
-        'cause',
-        'confidence',
-        'strength',
-        'text',
-        'advice',
-    ):
+    for name in EVENT_FIELDS:
         setattr(message, name, getattr(event, name))
     return message
