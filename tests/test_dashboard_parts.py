@@ -13,6 +13,7 @@ from damadics_dashboard.live.raw import Batch
 from damadics_dashboard.live.traces import NANO, Trace, envelope
 from damadics_dashboard.live.valve import Valve
 from damadics_dashboard.pages.fleet_page import tile
+from damadics_dashboard.pages.valve_words import alarm_words
 from damadics_dashboard.server.access import COOKIE, Guard, check_binding
 from damadics_dashboard.server.limits import SizeLimit
 from damadics_dashboard.store.export import cell
@@ -20,7 +21,7 @@ from damadics_dashboard.store.history import History, Wanted
 from damadics_dashboard.words.templates import TEMPLATES, render
 from damadics_dashboard.words.texts import texts
 from damadics_fd.store.access import Access, AccessError, Grant, Role
-from damadics_msgs.msg import FaultEvent, FaultFlag, Measurement
+from damadics_msgs.msg import FaultEvent, FaultFlag, Isolation, Measurement
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rclpy.serialization import serialize_message
@@ -423,3 +424,32 @@ def test_what_is_too_large_is_answered_with_413_before_it_is_taken():
     assert status == [413, 413, 413]
     assert send(limit, '/x', body=[b'a' * 60, b'b' * 40])[0]['status'] == 200
     assert send(limit, '/_nicegui/client/1', body=[b'a' * 999])[0]['status'] == 200
+
+
+def test_an_alarm_says_what_is_wrong_how_much_and_what_to_do_then_the_numbers():
+    valve = Valve('lv101')
+    valve.take_flag(flag(FaultFlag.STATE_ALARM, 1, 1), 100.0)
+    told = {'cause': 'friction_up', 'strength': 1.65, 'confidence': 0.99, 'ratio': 0.73}
+    valve.take_event({**event(FaultEvent.RAISED), **told})
+    valve.isolation = Isolation(occurrence=1, found_by='signature', deviation=0.195)
+    words = alarm_words(valve, valve.alarm(), texts('en'), name=True)
+    assert words.headline == 'lv101: Friction is 2.6 times normal.'
+    assert words.advice.startswith('Check the packing')
+    assert words.found.startswith('Found by the valve signature')
+    cells = dict(words.cells)
+    assert cells['Change'] == '+165% ± 39%, confidence 99%'
+    assert cells['Largest residual'] == '73 % of limit'
+    valve.isolation.found_by = 'control-room test'
+    german = alarm_words(valve, valve.alarm(), texts('de'), name=False)
+    assert german.headline == 'Die Reibung beträgt das 2,6-Fache des Normalen.'
+    assert german.found == 'Von einem Leitwartentest gefunden.'
+
+
+def test_durations_and_times_have_one_form():
+    t = texts('en')
+    shown = [t.duration(s) for s in (0.04, 9.94, 9.96, 59.4, 59.6, 599.9, 3599.6, 86400.0, 2.6e5)]
+    assert shown == [
+        '0.0 s', '9.9 s', '10 s', '59 s', '1 min 0 s', '10 min 0 s', '1 h 0 min', '24 h 0 min',
+        '3 days',
+    ]  # fmt: skip
+    assert re.fullmatch(r'2023-11-1\d \d\d:\d\d:\d\d UTC([+-]\d\d:\d\d)?', t.moment(17 * 10**17))

@@ -298,6 +298,11 @@ class Valve:
             if flag.threshold > 0.0:
                 now = flag.residual / flag.threshold
                 evidence['ratio'] = max(evidence.get('ratio') or 0.0, now)
+        if self.isolation is not None and self.isolation.occurrence == flag.occurrence:
+            evidence |= {
+                'found_by': self.isolation.found_by,
+                'deviation': self.isolation.deviation,
+            }
         return Alarm(
             flag.occurrence,
             flag.level,

@@ -110,7 +110,7 @@ def headline(event: dict[str, Any], t: Texts) -> tuple[str, str, str]:
         confidence = event.get('confidence')
         return cause.words(
             math.nan if strength is None else strength,
-            math.nan,
+            event.get('deviation', math.nan),
             math.nan if confidence is None else confidence,
         )
     ratio = event.get('ratio')
@@ -167,6 +167,8 @@ def found_by(event: dict[str, Any], t: Texts) -> str:
     :param t: the words.
     :return: a sentence, '' where nothing is known.
     """
+    if event.get('found_by') == 'control-room test':
+        return t('found_test')
     ratio = event.get('ratio')
     if ratio is None or not math.isfinite(ratio):
         return ''

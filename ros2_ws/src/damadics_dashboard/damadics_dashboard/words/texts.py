@@ -95,7 +95,7 @@ class Texts:
             return f'{whole} s'
         if whole < 3600:
             return f'{whole // 60} min {whole % 60} s'
-        minutes = round(seconds / 60.0)
+        minutes = round(whole / 60.0)
         if minutes < 48 * 60:
             return f'{minutes // 60} h {minutes % 60} min'
         return self('days', number=f'{seconds / 86400.0:.0f}')
