@@ -56,6 +56,7 @@ class Joiner:
         self.newest = 0  # source time of the newest value taken in [ns]
         self._period = period
         self._settle = settle
+        self._step = max(STEP, 3 * period)
         self._emit = emit
         self._expected = sum(1 << slot for slot in signals)
         self._values = [NAN] * len(SIGNALS)
@@ -72,6 +73,7 @@ class Joiner:
         self._ahead_at = 0
         self._resumed = False
         self._first = True  # no sample since the session began
+        self._guessed = False  # no change since the session began has told the source's time
 
     @property
     def last(self) -> int:
@@ -108,6 +110,7 @@ class Joiner:
         if self._ahead is None:
             self._ahead = source_now - now
             self._ahead_at = now
+            self._guessed = True
 
     def without(self, slot: int) -> None:
         """Go on without a signal that the source does not have."""
@@ -202,6 +205,9 @@ class Joiner:
             self._send(end, now, held=False)
         elif end <= self._last:
             self._ahead = ahead  # a held sample came too early: the clock was set back a little
+            if complete and self._guessed and self._last - end >= self._step:
+                self.tally.steps += 1  # the source's clock is far behind that of its server
+                self._send(end, now, held=False)
 
     def _complete(self, now: int) -> bool:
         return not self._expected & ~self._known or now - self._alive_since > WAIT
@@ -226,10 +232,9 @@ class Joiner:
 
     def _set_back(self, slot: int, stamp: int, before: int, now: int) -> bool:
         """Tell a clock that was set back from a value that is late: it goes on from there."""
-        step = max(STEP, 3 * self._period)
         back = self._back[slot]
         if not back or stamp <= back:
-            self._back[slot] = stamp if before - stamp >= step else 0
+            self._back[slot] = stamp if before - stamp >= self._step else 0
             self._known |= 1 << slot
             self.tally.late += 1
             return False
@@ -249,6 +254,7 @@ class Joiner:
     def _send(self, stamp: int, now: int, held: bool) -> None:
         self._last = stamp
         self._first = False
+        self._guessed &= held
         self._sent_at = now
         self.tally.samples += 1
         self.tally.held += held

@@ -174,3 +174,17 @@ def test_a_signal_that_the_source_lacks_is_not_waited_for():
     rig.at(0, (CV, 0.5), (X1, 0.5))
     assert rig.stamps == [DAY0]
     assert math.isnan(rig.rows[0][1][P1])
+
+
+@pytest.mark.parametrize('hours', [-1.0, 1.0])
+def test_a_source_whose_clock_is_not_that_of_its_server(hours):
+    rig = Rig()
+    off = DAY0 + int(hours * 3600 * NANO)
+    rig.joiner.source_clock(DAY0, rig.now)
+    for slot in (CV, X1, P1):
+        rig.joiner.take(slot, off - 86_400 * NANO, 0.5, rig.now)  # unchanged since yesterday
+    rig.quiet(0.1, 5.0)
+    assert len(rig.rows) >= 3, 'held by the server clock, as nothing else is known'
+    for t in range(5, 10):
+        rig.at(t, (CV, t), (X1, t), (P1, t), offset=off)
+    assert rig.stamps[-5:] == [off + t * NANO for t in range(5, 10)]

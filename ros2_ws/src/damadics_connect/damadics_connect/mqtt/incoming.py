@@ -4,7 +4,6 @@
 
 import asyncio
 import contextlib
-import json
 import math
 import time
 from collections.abc import Callable, Sequence
@@ -13,16 +12,15 @@ from functools import partial
 
 from aiomqtt import Client, Message, MqttError
 from damadics_fd.core.sample import SIGNALS
-from damadics_fd.core.text import NAME, plain
 from damadics_fd.ros.diagnostics import Report
 
 from damadics_connect.health import report
 from damadics_connect.joining import NANO, Joiner
 from damadics_connect.mqtt.broker import PAUSES, Broker, why
+from damadics_connect.mqtt.json_sample import field_at, limited, number_or_word, parsed
 from damadics_connect.mqtt.sparkplug import (
     NAMESPACE,
     REBIRTH,
-    PayloadError,
     number_of,
     read_payload,
     write_payload,
@@ -30,7 +28,6 @@ from damadics_connect.mqtt.sparkplug import (
 from damadics_connect.publishing import Output
 from damadics_connect.valve_list import ValveSource
 
-LARGEST = 1_000_000  # bytes of a message
 UNITS = {'s': NANO, 'ms': 1_000_000, 'us': 1000, 'ns': 1}
 LATEST = 2**62  # ns
 AGAIN = 5.0  # s between two requests for a birth certificate
@@ -168,9 +165,9 @@ class Incoming:
         now = time.monotonic_ns()
         for valve in self._valves.get(str(message.topic), ()):
             try:
-                content = _parsed(message.payload)
+                content = parsed(message.payload)
                 stamp = self._stamp_of(content)
-                values = {name: _number(_at(content, name)) for name in valve.fields}
+                values = {name: number_or_word(field_at(content, name)) for name in valve.fields}
             except ValueError as problem:
                 if valve.refused != str(problem):
                     self._log(f'{valve.source.name}: message refused: {problem}')
@@ -189,7 +186,7 @@ class Incoming:
 
     def _stamp_of(self, content: dict[str, object]) -> int:
         field, unit = self._stamp
-        given = _at(content, field)
+        given = field_at(content, field)
         if given is None:
             self._unstamped += 1
             return time.time_ns()
@@ -227,7 +224,7 @@ class Incoming:
         if kind not in ('NBIRTH', 'DBIRTH', 'NDATA', 'DDATA'):
             return
         try:
-            payload = read_payload(_limited(message.payload))
+            payload = read_payload(limited(message.payload))
         except ValueError as problem:
             for valve in valves:
                 valve.refused = str(problem)
@@ -274,45 +271,3 @@ class Incoming:
         self._asked[key] = now
         request = write_payload({REBIRTH: True}, time.time_ns() // UNITS['ms'], None)
         await client.publish(f'{NAMESPACE}/{group}/NCMD/{node}', request, qos=0)
-
-
-def _limited(payload: object) -> bytes:
-    if not isinstance(payload, bytes | bytearray):
-        return b''
-    if len(payload) > LARGEST:
-        raise PayloadError(f'{len(payload)} bytes: a message has at most {LARGEST}')
-    return bytes(payload)
-
-
-def _parsed(payload: object) -> dict[str, object]:
-    try:
-        content = json.loads(_limited(payload))
-    except PayloadError:
-        raise
-    except (ValueError, RecursionError) as problem:
-        raise ValueError('not JSON') from problem
-    if not isinstance(content, dict):
-        raise ValueError('JSON, but not an object such as {"stamp": ..., "cv": ...}')
-    return content
-
-
-def _at(content: dict[str, object], path: str) -> object:
-    """Find a field, also one inside others: `position.value`."""
-    if path in content:
-        return content[path]
-    found: object = content
-    for part in path.split('.'):
-        found = found.get(part) if isinstance(found, dict) else None
-    return found
-
-
-def _number(value: object) -> float | str:
-    """Return a number; NaN for none; a text that says what it is instead."""
-    if value is None:
-        return math.nan
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return f'{plain(type(value).__name__, NAME)} where a number is expected'
-    try:
-        return float(value)
-    except OverflowError:
-        return 'a number that is too large'

@@ -50,9 +50,10 @@ async def connect(path: Path, ros_args: list[str]) -> int:
     :return: exit code.
     """
     from damadics_connect.opcua.cycles import Cycles
+    from damadics_connect.opcua.feed import Options
     from damadics_connect.opcua.server import Judgements, read_serve
     from damadics_connect.opcua.session import read_endpoint
-    from damadics_connect.opcua.source import Options, Source
+    from damadics_connect.opcua.source import Source
     from damadics_connect.opcua.wire import keep_bytes
     from damadics_connect.publishing import output_of
     from damadics_connect.valve_list import read_valves

@@ -5,15 +5,16 @@
 import asyncio
 import time
 from collections.abc import Callable, Sequence
+from datetime import datetime
 from functools import partial
-from typing import NamedTuple
 
 from asyncua import Client, ua
 from damadics_fd.core.sample import SIGNALS
 from damadics_fd.ros.diagnostics import Report
 
 from damadics_connect.health import report, some
-from damadics_connect.joining import NANO, Joiner
+from damadics_connect.opcua.feed import Feed, Item, Options
+from damadics_connect.opcua.node_ids import nanoseconds_of, node_of
 from damadics_connect.opcua.session import (
     Endpoint,
     SessionError,
@@ -21,13 +22,11 @@ from damadics_connect.opcua.session import (
     open_session,
     why,
 )
-from damadics_connect.opcua.wire import UNIX, Changes, WireError, read_changes
+from damadics_connect.opcua.wire import Changes, WireError, read_changes
 from damadics_connect.publishing import Output
 from damadics_connect.settings import shown
 from damadics_connect.valve_list import ValveSource
 
-SHORTEST_INTERVAL, LONGEST_INTERVAL = 0.02, 0.5  # s between two messages of the server
-HELD_UP = 2.0  # s for which the server keeps values while it, the network or we are held up
 KEEP_ALIVE = 0.5  # s between two words of a server that has nothing new
 QUIET = 1.2  # s without a word after which the session counts as lost
 PAUSES = (0.2, 0.5, 1.0, 2.0, 5.0)  # s before it is tried again
@@ -37,57 +36,6 @@ QUALITY = 0xC0000000  # the two bits of a status code that say good, uncertain o
 UNCERTAIN, BAD = 0x40000000, 0x80000000
 OVERFLOW = 0x480  # of a data value: the server's queue was too short
 Log = Callable[[str], None]
-
-
-class Options(NamedTuple):
-    """How the server is asked."""
-
-    interval: float = 0.0  # s between two messages of the server; 0: half the valve's period
-    queue: int = 0  # values kept for one message; 0: those of 2 s more
-    poll: bool = False  # read instead of subscribing
-
-
-class Item(NamedTuple):
-    """One signal of one valve, as a monitored item of the server."""
-
-    valve: str
-    slot: int
-    scale: Callable[[float], float]
-    joiner: Joiner
-
-
-class Feed:
-    """
-    The valves with one period: one subscription.
-
-    :param period: [s].
-    :param valves: with the numbers that the output knows them by.
-    :param options: how the server is asked.
-    :param output: takes the samples.
-    """
-
-    def __init__(
-        self, period: float, valves: dict[int, ValveSource], options: Options, output: Output
-    ) -> None:
-        self.period = period
-        half = min(max(period / 2.0, SHORTEST_INTERVAL), LONGEST_INTERVAL)
-        self.interval = options.interval or half
-        self.queue = options.queue or round((self.interval + HELD_UP) / period) + 2
-        self.items: list[Item] = []
-        self.nodes: list[str] = []
-        self.joiners: dict[str, Joiner] = {}
-        settle = int((1.5 * self.interval + 0.05) * NANO)
-        for number, valve in valves.items():
-            joiner = Joiner(
-                int(period * NANO),
-                settle,
-                tuple(signal.slot for signal in valve.signals),
-                partial(output.send, number),
-            )
-            self.joiners[valve.name] = joiner
-            for signal in valve.signals:
-                self.items.append(Item(valve.name, signal.slot, signal.scale, joiner))
-                self.nodes.append(signal.source)
 
 
 class Source:
@@ -263,9 +211,9 @@ class Source:
             elif isinstance(notification, ua.StatusChangeNotification):
                 self._heard = 0.0  # the server has ended the subscription: begin again
 
-    def _take_changes(self, feed: Feed, changes: Changes, server: object) -> None:
+    def _take_changes(self, feed: Feed, changes: Changes, server: datetime | None) -> None:
         now = time.monotonic_ns()
-        wall = _ticks(server) or time.time_ns()
+        wall = nanoseconds_of(server) or time.time_ns()
         for joiner in feed.joiners.values():
             joiner.source_clock(wall, now)
         self._values += len(changes.handle)
@@ -316,7 +264,9 @@ class Source:
             for handle, result in enumerate(results):
                 value = result.Value.Value if result.Value is not None else None
                 number = isinstance(value, int | float)
-                stamp = _ticks(result.SourceTimestamp) or _ticks(result.ServerTimestamp)
+                stamp = nanoseconds_of(result.SourceTimestamp) or nanoseconds_of(
+                    result.ServerTimestamp
+                )
                 row = (
                     handle,
                     float(value) if number else float('nan'),
@@ -329,29 +279,3 @@ class Source:
             self._take_changes(feed, changes, None)
             due = max(due + feed.period, time.monotonic() - feed.period)
             await asyncio.sleep(max(0.0, due - time.monotonic()))
-
-
-def node_of(text: str, spaces: Sequence[str]) -> ua.NodeId | None:
-    """
-    Read a node id.
-
-    :param text: as `ns=2;s=LV101.PV`, `i=2258` or `nsu=URI;s=LV101.PV`.
-    :param spaces: URIs of the server's namespaces.
-    :return: the node id; None where the text is none or the namespace is unknown.
-    """
-    if text.startswith('nsu='):
-        uri, _, rest = text.removeprefix('nsu=').rpartition(';')
-        if uri not in spaces:
-            return None
-        text = f'ns={spaces.index(uri)};{rest}'
-    try:
-        return ua.NodeId.from_string(text)
-    except (ua.UaError, ValueError):
-        return None
-
-
-def _ticks(when: object) -> int:
-    """Return a time of asyncua as ns since 1970; 0 for none."""
-    if when is None:
-        return 0
-    return max(0, (ua.datetime_to_win_epoch(when) - UNIX) * 100)  # type: ignore[arg-type]
