@@ -11,7 +11,9 @@ LEAST_MAX_AGE = 2.0  # s
 PERIODS = 3.0  # sample periods; slower samples are that old by nature
 BACK = 1.0  # s that stamps may be out of order without being another run
 INTERRUPTED = 0.3  # s without a sample, after which a source of simulated stamps may have paused
+MISSED = 2.5  # of the usual time between two samples, where these are slower
 WINDOW = 2.0  # s; two of them with the same delay after it say that it has
+IN_WINDOW = 3.0  # samples at least
 EVEN = 0.1  # s
 JUMP = 60.0  # s that a stamp may run ahead of the time that has passed
 AGREEING = 3  # samples in a row that make a jump ahead credible
@@ -46,6 +48,7 @@ class Freshness:
         self._stamp: int | None = None
         self._steady = 0.0  # when it was heard [s]
         self._least = math.inf  # of steady time less stamp [s]
+        self._usual = math.inf  # time between two samples [s]
         self._delay = 0.0  # of the newest sample: steady time less stamp [s]
         self._pause = 0.0  # what the last interruption may have been [s]
         self._window = 0.0  # when the present window began [s]
@@ -64,14 +67,18 @@ class Freshness:
         if before is None or stamp < before - BACK * SECOND or is_date(before) != is_date(stamp):
             self._least = delay
             self._pause = 0.0
-        elif steady - self._steady > INTERRUPTED:
+        elif (gap := steady - self._steady) > max(INTERRUPTED, MISSED * self._usual):
             self._pause += max(delay - self._delay, 0.0)
             self._begin_window(steady, math.inf)
+        elif self._usual < math.inf:
+            self._usual += 0.2 * (gap - self._usual)
+        else:
+            self._usual = gap
         self._least = min(self._least, delay)
         self._delay, self._steady = delay, steady
         if self._pause > 0.0:
             self._lowest = min(self._lowest, delay)
-            if steady - self._window > WINDOW:
+            if steady - self._window > max(WINDOW, IN_WINDOW * self._usual):
                 if abs(self._lowest - self._before) < EVEN:
                     self._least += min(self._pause, self._lowest - self._least)
                     self._pause = 0.0

@@ -78,6 +78,20 @@ def test_a_source_that_was_paused_is_fresh_again_after_a_while():
     assert fresh.age(0, 10.0 + 6.0) == pytest.approx(0.0, abs=0.3)
 
 
+@pytest.mark.parametrize('period', [0.005, 1.0, 10.0])
+def test_slow_sources_may_pause_too(period):
+    fresh = Freshness()
+    for n in range(20):
+        fresh.heard(int(n * period * SECOND), n * period)
+    now = 0.0
+    for n in range(20, 2000 if period < 1.0 else 60):
+        now = 50.0 + n * period
+        fresh.heard(int(n * period * SECOND), now)
+        if n == 21:
+            assert fresh.age(0, now) == pytest.approx(50.0, abs=0.1)
+    assert fresh.age(0, now) == pytest.approx(0.0, abs=0.1)
+
+
 def test_another_run_begins_anew():
     fresh = Freshness()
     for n in range(200):
