@@ -6,6 +6,7 @@ import math
 import string
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from typing import Any
 import yaml
 
 from damadics_fd.core.decision.events import Event
+from damadics_fd.core.record import Plain
 from damadics_fd.core.signature.state import CAUSES
 from damadics_fd.store.trends import QUANTITIES
 
@@ -139,6 +141,14 @@ class CauseTable:
         return self.causes[cause]
 
 
+@cache
+def _own(name: str) -> Plain:
+    """Return the content of a table of the package; read once, since YAML is slow."""
+    text = resources.files('damadics_fd').joinpath(name).read_text('utf-8')
+    content: Plain = yaml.safe_load(text)
+    return content
+
+
 def load_causes(path: Path | None = None, language: str = 'en') -> CauseTable:
     """
     Load the table of the package and, over it, the user's.
@@ -152,12 +162,10 @@ def load_causes(path: Path | None = None, language: str = 'en') -> CauseTable:
     >>> load_causes()['spring_softer'].describe('LV-101', -0.05, 0.0005, 0.99)[0]
     'LV-101: The spring is 5.0% softer than learned. (-5.0% ± 0.1%, confidence 99%)'
     """
-    standard = resources.files('damadics_fd').joinpath('causes.yaml').read_text('utf-8')
-    causes, limits = _parse(yaml.safe_load(standard), 'causes.yaml')
+    causes, limits = _parse(_own('causes.yaml'), 'causes.yaml')
     if language != 'en':
         name = f'causes.{language}.yaml'
-        texts = resources.files('damadics_fd').joinpath(name).read_text('utf-8')
-        translated, _ = _parse(yaml.safe_load(texts), name, causes)
+        translated, _ = _parse(_own(name), name, causes)
         causes |= {key: replace(cause, language=language) for key, cause in translated.items()}
     if path is not None:
         try:
