@@ -10,7 +10,7 @@ READERS := tools/npm/node_modules/.package-lock.json
 SOURCES := $(shell find ros2_ws/src -type f -not -name '*.pyc' -not -path '*/__pycache__/*' \
 	-not -path '*/test/*' -not -path '*/.pytest_cache/*')
 
-.PHONY: help demo demo-plant dashboard test report campaign-monitor build env lint types docs lock soak attack licences clean
+.PHONY: help demo demo-plant dashboard test report campaign-monitor build env lint types docs lock soak attack licences clean fuzz
 
 help: ## show what can be made
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 18
@@ -48,6 +48,10 @@ $(READERS): tools/npm/package-lock.json
 	@if command -v npm > /dev/null; then \
 		echo 'Setting up the readers of Foxglove and Lichtblick ...'; npm ci --silent --prefix tools/npm; \
 	else echo 'npm is not installed: bags are not checked with the readers of Foxglove'; fi
+
+fuzz: $(BUILT) ## 6000 mutations of bags by a new seed (another: FUZZ_SEED=1 FUZZ_COUNT=100)
+	@$(ENV) && python -m pytest -s -m slow -k thousands_of_mutations \
+		ros2_ws/src/damadics_fd/test/bag/test_fuzz.py
 
 lint: $(BUILT) ## check style and types
 	@$(ENV) && ruff check . && ruff format --check .

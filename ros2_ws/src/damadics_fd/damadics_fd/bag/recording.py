@@ -23,6 +23,7 @@ TABLES = ('.csv', '.txt', '.tsv', '.parquet', '.pq')
 MEASUREMENT = 'damadics_msgs/msg/Measurement'
 __all__ = ['SIGNALS', 'Recording', 'find_recordings', 'parse_maps']
 _ELEMENT = re.compile(r'\[(\d+)\]$')  # of an array
+MOST_VALVES = 1000  # in one bag that are replayed without being asked for
 Told = Callable[[str], None]
 
 
@@ -62,7 +63,14 @@ class Recording:
         elif self.maps:
             yield self._mapped(on_problem)
         else:
-            yield from iter_columns(self.path, self.topic, on_problem=on_problem)
+            for columns in iter_columns(self.path, self.topic, on_problem=on_problem):
+                if not {'cv', 'x1'} <= columns.keys():
+                    raise BagError(
+                        f'{self.topic} has no field cv or x1; it has {listing(columns)}. Name the'
+                        ' signals: --map cv=/topic.field --map x1=/topic.field',
+                        self.path,
+                    )
+                yield columns
 
     def truth(self, on_problem: Told) -> Columns | None:
         """Return `stamp`, `fault` and `strength` where a bag has them."""
@@ -222,6 +230,13 @@ def _recordings(
         topics = measurement_topics(path)
     except BagError as error:
         problems.append(error)
+        return []
+    if len(topics) > MOST_VALVES:
+        problems.append(
+            BagError(
+                f'holds {len(topics)} valves, more than {MOST_VALVES}: name one: --topic', path
+            )
+        )
         return []
     problems += [
         NoMeasurementError(f'the topic {name} is empty', path)

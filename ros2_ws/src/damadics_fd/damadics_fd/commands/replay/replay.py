@@ -49,6 +49,7 @@ failed, 2 wrong command line"""
 BESIDE = Path()  # bags with the flags go next to the inputs
 WARNINGS = 3  # shown per recording
 _SUFFIX = re.compile(r'(\.(mcap|db3)(\.zstd)?|\.csv|\.txt|\.tsv|\.parquet|\.pq)$', re.IGNORECASE)
+_UNSAFE = re.compile(r'[^\w. +#()@=-]')
 _counter: Any = None  # samples done by all workers
 
 
@@ -287,6 +288,7 @@ def unique_stems(recordings: Sequence[Recording]) -> Iterator[str]:
             stem += f'_{recording.table.name}'
         elif recording.topic != '/measurement':
             stem += recording.topic.removesuffix('measurement').rstrip('/').replace('/', '_')
+        stem = _UNSAFE.sub('_', stem)  # topics are text from outside
         names = chain([stem], (f'{stem}_{number}' for number in count(2)))
         taken.add(stem := next(name for name in names if name not in taken))
         yield stem
