@@ -43,10 +43,11 @@ class Valve:
         self.stamp = 0
         self.events = []
 
-    def feed(self, ratio, seconds=0.0, phase=PHASE_MONITOR, x=0.5):
+    def feed(self, ratio, seconds=0.0, phase=PHASE_MONITOR, x=0.5, stroke=0.02):
         for _ in range(max(1, round(seconds * 1e9 / TICK))):
             self.stamp += TICK
             xi2 = ratio * self.settings.rho_min
+            moved = x + stroke * (self.stamp // 1_000_000_000 % 2)
             decision = self.detector.update(
                 Estimate(
                     self.stamp,
@@ -59,7 +60,7 @@ class Valve:
                     750.0,
                     30446.0,
                     30446.0,
-                    x,
+                    moved,
                     0.5,
                     2e5,
                     9e5,
@@ -134,7 +135,7 @@ def test_returned_alarm_stays_until_a_person_has_seen_it():  # AM-3, AM-4, AM-5
     assert not valve.feed(0.1).fault
 
 
-def test_acknowledged_alarm_is_announced_again_only_as_a_new_occurrence():  # AM-4, AL-7
+def test_new_evidence_of_a_latched_alarm_is_no_new_alarm():  # AM-4, AL-7
     valve = Valve()
     valve.feed(1.2, 1.0)
     first = valve.detector.acknowledge()
@@ -142,10 +143,24 @@ def test_acknowledged_alarm_is_announced_again_only_as_a_new_occurrence():  # AM
     assert valve.feed(1.3, 1.0).acknowledged
     valve.feed(0.1, 6.0)
     decision = valve.feed(1.2, 1.0)
-    assert decision.occurrence == 2
+    assert decision.occurrence == 1
+    assert decision.acknowledged
+    assert valve.names() == ['raised', 'cleared', 'changed']
+    valve.feed(0.1, 6.0)
+    assert valve.detector.reset_alarm().done
+    decision = valve.feed(1.2, 1.0)
+    assert decision.occurrence == 2  # after the reset it is another one
     assert not decision.acknowledged
-    assert valve.names() == ['raised', 'cleared', 'raised']
-    assert valve.events[2].onset == valve.stamp - 200 * TICK + TICK
+    assert valve.events[-1].onset == valve.stamp - 200 * TICK + TICK
+
+
+def test_a_resting_stem_ends_no_alarm():
+    valve = Valve(latch=False)
+    valve.feed(1.2, 1.0)
+    assert valve.feed(0.1, 600.0, stroke=0.0).fault
+    assert valve.feed(0.1, 4.0).fault
+    assert not valve.feed(0.1, 4.0).fault
+    assert valve.names() == ['raised', 'cleared']
 
 
 def test_levels_rise_with_the_ratio():
@@ -295,8 +310,8 @@ def test_gates_at_the_stops():  # AL-4
 
 def test_frozen_position_is_named():  # IN-4
     valve = Valve()
-    valve.feed(0.1, 20.0)
-    valve.feed(3.0, 0.1)
+    valve.feed(0.1, 20.0, stroke=0.0)
+    valve.feed(3.0, 0.1, stroke=0.0)
     assert 'position frozen for 20 s: stem or position sensor' in valve.events[0].text
 
 
@@ -307,7 +322,7 @@ class AlarmMachine(RuleBasedStateMachine):
         super().__init__()
         self.valve = Valve(on_delay=0.01, off_delay=0.1)
         self.valve.feed(0.1)
-        self.raised = self.cleared = 0
+        self.raised = self.resumed = self.cleared = 0
         self.active_before = False
         self.reset_allowed = False
 
@@ -316,6 +331,9 @@ class AlarmMachine(RuleBasedStateMachine):
             if event.transition == RAISED:
                 assert not self.active_before
                 self.raised += 1
+                self.active_before = True
+            elif event.transition == CHANGED and not self.active_before:
+                self.resumed += 1
                 self.active_before = True
             elif event.transition == CLEARED:
                 assert self.active_before
@@ -390,7 +408,8 @@ class AlarmMachine(RuleBasedStateMachine):
         state = self.valve.detector.state[0]
         decision = self.valve.detector.decision
         assert bool(state.active) == self.active_before
-        assert int(state.occurrence) == self.raised == self.cleared + self.active_before
+        assert int(state.occurrence) == self.raised
+        assert self.raised + self.resumed == self.cleared + self.active_before
         shelved = state.shelved_until > 0
         assert decision.fault == ((bool(state.active) or bool(state.latched)) and not shelved)
         assert not state.active or state.latched

@@ -131,7 +131,10 @@ def _with_lag(
     given: Collection[str],
     undetermined: list[str],
 ) -> Balance:
-    s = s.replace(ps_lag=float(f'{lag.seconds:.3g}'))
+    s = s.replace(
+        ps_lag=float(f'{lag.seconds:.3g}'),
+        ps_lag_std=float(f'{lag.std:.2g}') if lag.std < 1.0 else 1.0,
+    )
     b = blocks(signals, BLOCK, s.ps_lag)
     use = _enough(b)
     s, gain, shape = _plug(b, use, s, sheet, given)

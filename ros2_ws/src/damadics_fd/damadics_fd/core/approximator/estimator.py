@@ -8,6 +8,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from damadics_fd.core.approximator import guard
 from damadics_fd.core.approximator.state import LEARNED, Estimate, State
 from damadics_fd.core.approximator.step import (
     estimate_column,
@@ -155,12 +156,20 @@ class Estimator(Intake):
                 )
             return 'monitoring'
         share = f'learning, {100.0 * self.progress:.0f} %'
+        late = (s.elapsed - s.start) * 1e-9 >= c.t_learn
+        if (late or s.unsettled) and c.mode == 'monitor' and guard.unlike(s):
+            return (
+                f'{share}: the parameters stroke, stiffness, area, preload, plug_diameter ... are '
+                'not those of this valve (its force balance has '
+                f'{100.0 * float(s.theta[1]):+.0f} % stiffness, '
+                f'{float(s.theta[0]) * c.stiffness * c.stroke:+.0f} N offset, leaves '
+                f'{float(s.sigma) * c.stiffness * c.stroke:.0f} N): run commission'
+            )
         if s.unsettled:
             return (
                 f'{share}: learning was refused {int(s.unsettled)} times because the valve '
                 f'changed meanwhile ({self._change()}); inspect it, then learn anew'
             )
-        late = (s.elapsed - s.start) * 1e-9 >= c.t_learn
         if late:
             if s.travel < c.travel_min:
                 return (

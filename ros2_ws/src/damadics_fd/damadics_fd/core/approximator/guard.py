@@ -29,6 +29,8 @@ SIGMA_MIN = 1e-3  # of K L: model error of the moving stem
 QUICK = 0.5  # s; mean over which a force that leaves the fit is judged
 ENOUGH = 8.0  # weight that makes a block comparable, in correlation times
 CONFIDENCE = 3.5  # standard deviations
+FAR = 0.15  # change of stiffness, or of the force / (K L), that no valve of that sheet has
+LEFT_OVER, LEAST_LEFT = 0.75, 0.015  # misfit: share of the friction, and of K L at least
 
 
 @jit
@@ -175,6 +177,20 @@ def close_block(s: State, c: Settings) -> bool:
             s.sigma = fit(s.pool, s.theta, s.cov)
     s.block[:] = 0.0
     return same
+
+
+@jit
+def unlike(s: State) -> bool:
+    """
+    Tell whether the force balance is not that of a valve with the constants of the settings.
+
+    :param s: state record with the fit of all blocks.
+    :return: True where spring or its origin are far off, or the balance leaves more than friction.
+    """
+    if s.base[0] == 0.0:
+        return False
+    far = abs(s.theta[1]) > FAR or abs(s.theta[0]) > FAR
+    return far or s.sigma > max(LEFT_OVER * abs(s.theta[2]), LEAST_LEFT)
 
 
 @jit

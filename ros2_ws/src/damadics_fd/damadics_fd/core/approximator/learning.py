@@ -205,6 +205,8 @@ def excited(s: State, c: Settings) -> bool:
     :param c: settings record.
     :return: False where more motion is needed.
     """
+    if guard.unlike(s):
+        return False
     learned = network.bound(s, 0.0)
     if s.proven == 0.0 or learned > UNPROVEN * s.proven:
         return False

@@ -115,14 +115,50 @@ def raise_alarm(a: Alarm, c: Settings, stamp: int, level: int) -> None:
     a.worst = level
     a.onset = a.excursion if a.excursion >= 0 else stamp
     a.peak = a.excursion_peak
-    a.recent[a.occurrence % c.chatter] = stamp
-    oldest = a.recent[(a.occurrence + 1) % c.chatter]
-    a.chatter = oldest >= 0 and stamp - oldest <= MINUTE
+    count_chatter(a, c, stamp)
+
+
+@jit
+def resume(a: Alarm, c: Settings, stamp: int, level: int) -> None:
+    """
+    Make a latched alarm active again: evidence of the same fault until a person resets it.
+
+    :param a: alarm record.
+    :param c: settings record.
+    :param stamp: stamp [ns].
+    :param level: 1..3.
+    """
+    a.active = True
+    a.worst = max(a.worst, level)
+    a.peak = max(a.peak, a.excursion_peak)
+    count_chatter(a, c, stamp)
+
+
+@jit
+def count_chatter(a: Alarm, c: Settings, stamp: int) -> None:
+    """
+    Tell whether the alarm has become active too often within a minute.
+
+    :param a: alarm record.
+    :param c: settings record.
+    :param stamp: stamp [ns].
+    """
+    for i in range(c.chatter - 1):
+        a.recent[i] = a.recent[i + 1]
+    a.recent[c.chatter - 1] = stamp
+    a.chatter = a.recent[0] >= 0 and stamp - a.recent[0] <= MINUTE
 
 
 @jit
 def judge(
-    a: Alarm, c: Settings, stamp: int, exceed: bool, busy: bool, level: int, ratio: float
+    a: Alarm,
+    c: Settings,
+    stamp: int,
+    exceed: bool,
+    busy: bool,
+    level: int,
+    ratio: float,
+    present: bool,
 ) -> int:
     """
     Take one decision of an armed detector.
@@ -134,6 +170,7 @@ def judge(
     :param busy: it was so in one of the last N samples.
     :param level: 0..3 as `decision.vote` returns it.
     :param ratio: residual / threshold.
+    :param present: the signature still sees the change, whatever the residual does.
     :return: transitions as a set of bits.
     """
     events = 0
@@ -147,8 +184,12 @@ def judge(
         if a.pending < 0:
             a.pending = stamp
         if not a.active and stamp - a.pending >= c.on_delay * 1e9:
-            raise_alarm(a, c, stamp, level)
-            events |= 1 << RAISED
+            if a.latched:
+                resume(a, c, stamp, level)
+                events |= 1 << CHANGED
+            else:
+                raise_alarm(a, c, stamp, level)
+                events |= 1 << RAISED
     else:
         a.pending = NEVER
     if a.active:
@@ -156,7 +197,7 @@ def judge(
         if level > a.worst:
             a.worst = level
             events |= 1 << CHANGED
-        gone = level == 0 and not exceed
+        gone = level == 0 and not exceed and not present
         if gone and stamp - a.last_decision >= c.off_delay * 1e9:
             a.active = False
             a.excursion = NEVER
@@ -179,9 +220,14 @@ def step(
     busy: bool,
     level: int,
     ratio: float,
+    moving: bool,
+    present: bool,
 ) -> int:
     """
     Take one decision.
+
+    A resting stem shows neither a fault nor its absence: the time without decision, after which
+    the condition counts as gone, is time of motion.
 
     :param a: alarm record.
     :param c: settings record.
@@ -191,6 +237,8 @@ def step(
     :param busy: it was so in one of the last N samples.
     :param level: 0..3 as `decision.vote` returns it.
     :param ratio: residual / threshold.
+    :param moving: the stem moves, so that a fault would show.
+    :param present: the signature still sees the change, whatever the residual does.
     :return: transitions as a set of bits.
     """
     events = 0
@@ -201,12 +249,14 @@ def step(
         a.recent[:] = NEVER
         if a.shelved_until > 0:
             a.shelved_until = stamp + max(a.shelved_until - a.stamp, 0)
+    if a.active and not moving and a.stamp >= 0:
+        a.last_decision += max(stamp - a.stamp, 0)
     a.stamp = stamp
     if a.shelved_until > 0 and stamp >= a.shelved_until:
         a.shelved_until = 0
         events |= 1 << UNSHELVED
     if armed:
-        events |= judge(a, c, stamp, exceed, busy, level, ratio)
+        events |= judge(a, c, stamp, exceed, busy, level, ratio, present)
     else:
         a.pending = NEVER
         if not a.active:

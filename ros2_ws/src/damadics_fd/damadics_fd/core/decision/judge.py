@@ -14,13 +14,14 @@ from damadics_fd.core.decision.alarm import Alarm
 from damadics_fd.core.decision.events import Decision
 from damadics_fd.core.decision.vote import Votes
 from damadics_fd.core.jit import jit, layer
-from damadics_fd.core.modes import PHASE_HOLD, PHASE_PAPER
+from damadics_fd.core.modes import MONITOR, PHASE_HOLD, PHASE_PAPER
 from damadics_fd.core.record import Array, Rows
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.signature import step as signature_step
 
 LARGE = 1e9  # ratio to a threshold of zero
 STIR = 0.01  # of the stroke: less is no motion of the stem
+FRESH = 2_000_000_000  # ns after its last motion in which the stem counts as moving
 
 
 class State(Votes, Alarm):
@@ -67,6 +68,8 @@ def step(s: State, c: Settings, g: Any, gc: Any, e: Estimate, d: Decision) -> No
         s.count[0] > 0,
         max(level, own),
         ratio,
+        c.mode_code != MONITOR or e.stamp - s.moved < FRESH,
+        signature_step.persists(g, gc),
     )
     present = s.active or s.latched
     if g.cause != cause or not present:

@@ -16,6 +16,7 @@ from damadics_fd.core.signature.state import FILL, STROKES, VENT
 
 P_ATM = 101325.0  # [Pa]
 ALIKE = 0.9  # [1] strokes at full opening differ by 4 % at most, those of ramps by 10 to 40 %
+ELSEWHERE = 0.5  # of the pressure of one stroke of the spring
 P_FLOOR = 5e3  # [Pa] less driving pressure than this says nothing
 MIN_STROKE = 0.15  # [1] a shorter stroke may not reach its top rate; holding against P1 does not
 
@@ -45,7 +46,7 @@ def track_air(s: Any, c: Any, learn: bool) -> bool:
     y = abs(rate) / math.sqrt(drive)
     ended = False
     if way != s.air_way:
-        ended = end_stroke(s, learn)
+        ended = end_stroke(s, c, learn)
         s.air_way = way
         s.air_n = 0
         s.air_moved = 0.0
@@ -63,11 +64,14 @@ def track_air(s: Any, c: Any, learn: bool) -> bool:
 
 
 @jit
-def end_stroke(s: Any, learn: bool) -> bool:
+def end_stroke(s: Any, c: Any, learn: bool) -> bool:
     """
     Take the second best rate of a stroke into the reference or the latest strokes.
 
+    Both are medians; a stroke at another chamber pressure is left out.
+
     :param s: state record.
+    :param c: settings record.
     :param learn: True while what is seen may become the reference.
     :return: True if the present rates are new.
     """
@@ -76,22 +80,55 @@ def end_stroke(s: Any, learn: bool) -> bool:
         return False
     if s.air_learned[way] < STROKES:
         if learn:
+            s.air_ring[way, s.air_learned[way]] = s.air_second
+            s.air_ring_ps[way, s.air_learned[way]] = s.air_ps
             s.air_learned[way] += 1
-            s.air_ref[way] = max(s.air_ref[way], s.air_second)
+            s.air_ref[way] = s.air_ring[way, middle(s.air_ring[way], s.air_learned[way])]
+            at = middle(s.air_ring_ps[way], s.air_learned[way])
+            s.air_ref_ps[way] = s.air_ring_ps[way, at]
         return False
+    if s.air_ref_ps[way] > 0.0 and abs(s.air_ps - s.air_ref_ps[way]) > ELSEWHERE * swing(c):
+        return False  # another process pressure, another driving pressure: it does not compare
     slot = s.air_count[way] % STROKES
     s.air_ring[way, slot] = s.air_second
     s.air_ring_ps[way, slot] = s.air_ps
     s.air_count[way] += 1
     if s.air_count[way] < STROKES:
         return False
-    best = 0
-    for i in range(STROKES):
-        if s.air_ring[way, i] > s.air_ring[way, best]:
-            best = i
-    s.air_rate[way] = s.air_ring[way, best] / s.air_ref[way]
-    s.air_rate_ps[way] = s.air_ring_ps[way, best]
+    usual = middle(s.air_ring[way], STROKES)
+    s.air_rate[way] = s.air_ring[way, usual] / s.air_ref[way]
+    s.air_rate_ps[way] = s.air_ring_ps[way, usual]
     return True
+
+
+@jit
+def swing(c: Any) -> float:
+    """
+    Return the chamber pressure that moves the spring over one stroke.
+
+    :param c: settings record.
+    :return: [Pa].
+    """
+    return abs(c.force_scale / c.diaphragm_area)
+
+
+@jit
+def middle(values: Any, n: int) -> int:
+    """
+    Find the median, which a spike does not move.
+
+    :param values: a few.
+    :param n: how many of them count, at least 1.
+    :return: index of the lower median.
+    """
+    for i in range(n):
+        below = 0
+        for j in range(n):
+            if values[j] < values[i] or (values[j] == values[i] and j < i):
+                below += 1
+        if below == (n - 1) // 2:
+            return i
+    return 0
 
 
 @jit
@@ -166,4 +203,5 @@ def forget_air(s: Any) -> None:
     for way in range(2):
         s.air_learned[way] = 0
         s.air_ref[way] = 0.0
+        s.air_ref_ps[way] = 0.0
     restart_air(s)

@@ -24,12 +24,14 @@ from damadics_fd.core.signature.state import (
     FAMILY_UNDETERMINED,
     FRICTION,
     N_HYP,
+    ONE,
     PRELOAD,
     SET_ALARM,
     SET_FAST,
     SET_SLOW,
     SPRING,
     STATE_MONITOR,
+    X1,
 )
 from damadics_fd.core.signature.sums import clear_set
 
@@ -46,6 +48,7 @@ STAGE2_STRIDE = 5
 STAGE2_SETTLED, STAGE2_STRONG = 2, 3
 SETTLED = 30.0  # [s] after the alarm: from then on the long record sizes a friction change
 STRONG = 1.0  # friction change of which the long record begins anew then
+TELLING = 0.2  # of the stroke: range that tells the members of the elastic family apart
 D_VERIFY = 12.0  # largest D expected of a right model
 
 
@@ -196,7 +199,7 @@ def name_friction(s: Any, c: Any, m: int, p: float) -> None:
     if s.stage2 >= STAGE2_SETTLED and s.D[SET_SLOW] > 0.0:
         m = SET_SLOW  # as the last stage 2 left it
     s.cause_value, s.cause_std = physical_value(s, c, m, FRICTION)
-    s.cause = CAUSE_FRICTION_UP if s.cause_value >= 0.0 else CAUSE_FRICTION_DOWN
+    s.cause = CAUSE_FRICTION_UP if s.value[m][FRICTION] >= 0.0 else CAUSE_FRICTION_DOWN
 
 
 @jit
@@ -295,4 +298,20 @@ def second_stage(s: Any, c: Any) -> None:
     s.cause_value, s.cause_std = physical_value(s, c, m, best)
     s.second = cause_of(best, s.cause_value)
     s.confidence = p
-    s.cause = s.second if p > c.p_firm else CAUSE_ELASTIC
+    s.cause = s.second if p > c.p_firm and ranged(s, m) else CAUSE_ELASTIC
+
+
+@jit
+def ranged(s: Any, m: int) -> bool:
+    """
+    Tell whether the stem went far enough to tell spring, preload and sensors apart.
+
+    At one operating point they are one column; a range r of it has the deviation r / sqrt(12).
+
+    :param s: state record.
+    :param m: index of the set.
+    :return: True where it did.
+    """
+    mean = s.S[m][X1, ONE] / s.ne[m]
+    variance = s.S[m][X1, X1] / s.ne[m] - mean * mean
+    return bool(variance * 12.0 > TELLING * TELLING)

@@ -147,18 +147,21 @@ def solve_group(
 
 
 @jit
-def combine(s: Any, count: int, a: float, b: float, scale: float) -> tuple[float, float]:
+def combine(
+    s: Any, count: int, first: float, a: float, b: float, scale: float
+) -> tuple[float, float]:
     """
-    Return the change d0 + a d1 + b d2 of the last group in units of `scale`.
+    Return the change first d0 + a d1 + b d2 of the last group in units of `scale`.
 
     :param s: state record after `solve_group`.
     :param count: number of columns.
+    :param first: weight of the first column.
     :param a: weight of the second column.
     :param b: weight of the third column.
     :param scale: unit.
     :return: value and standard deviation.
     """
-    weight = (1.0, a, b)
+    weight = (first, a, b)
     value, variance = 0.0, 0.0
     for i in range(count):
         value += weight[i] * s.d[i]
@@ -200,7 +203,11 @@ def evaluate(s: Any, c: Any, m: int, eps: float, b_r: float, b_p: float) -> floa
     v_mean = s.vb[m] / ne
     scale = max(s.theta[SIGN] + s.theta[V] * v_mean, SMALL_FRICTION)
     logp[FRICTION] = J_0 - explained
-    value[FRICTION], std[FRICTION] = combine(s, count, v_mean, now, scale)
+    value[FRICTION], std[FRICTION] = combine(s, count, 1.0, v_mean, now, scale)
+    dry = max(s.theta[SIGN], SMALL_FRICTION)
+    s.dry[m], s.dry_sd[m] = combine(s, count, 1.0, 0.0, now, dry)
+    gap = 1.0 / dry - 1.0 / scale
+    s.apart[m], s.apart_sd[m] = combine(s, count, gap, -v_mean / scale, gap * now, 1.0)
     if value[FRICTION] < -1.3 - SMALL / scale:
         logp[FRICTION] = J_0  # friction cannot become negative
     # spring
@@ -208,7 +215,7 @@ def evaluate(s: Any, c: Any, m: int, eps: float, b_r: float, b_p: float) -> floa
         s, m, iv, SPRING_COLUMNS, count - 1, (c.change_std[2], c.growth_std[1], 1.0, 1.0)
     )
     logp[SPRING] = J_0 - explained
-    value[SPRING], std[SPRING] = combine(s, count - 1, now, 0.0, s.theta[X1])
+    value[SPRING], std[SPRING] = combine(s, count - 1, 1.0, now, 0.0, s.theta[X1])
     if value[SPRING] < -1.05:
         logp[SPRING] = J_0
     for h in range(PRELOAD, N_HYP):

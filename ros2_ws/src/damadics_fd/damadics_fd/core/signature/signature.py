@@ -28,6 +28,7 @@ from damadics_fd.core.signature.state import (
 from damadics_fd.core.signature.step import step
 
 UNKNOWN = ('air_rate', 'now', 'now_std')
+LATER = {'air_ref_ps': [0.0, 0.0]}  # what references of version 0.1 do not have
 
 
 @jit
@@ -120,6 +121,7 @@ class Signature:
         :param saved: as returned by `save`.
         :raises ValueError: where it is no such reference; the present state is then untouched.
         """
+        saved = {**LATER, **saved}
         wrong = sorted(set(saved) ^ set(REFERENCE_DTYPE.names or ()))
         if wrong:
             raise ValueError(f'signature reference: {", ".join(wrong)} missing or unknown')

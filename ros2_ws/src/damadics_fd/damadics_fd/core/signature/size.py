@@ -12,12 +12,15 @@ from damadics_fd.core.signature.state import (
     POSITION_GAIN,
     PRELOAD,
     PRESSURE_GAIN,
+    SET_SLOW,
     SIGN,
     SPRING,
     X1,
     V,
 )
 
+UNKNOWN = 0.2  # relative deviation of the unit from which no size is stated
+APART = 4.0  # deviations by which dry and viscous friction must have changed differently
 SMALL_FRICTION = 1e-3  # [1] least friction that a share is taken of
 
 
@@ -46,8 +49,9 @@ def physical_value(s: Any, c: Any, m: int, h: int) -> tuple[float, float]:
     :param c: settings record.
     :param m: index of the set.
     :param h: hypothesis.
-    :return: value and standard deviation. Friction and spring as shares, preload in N, gains as
-        the sensor's gain error, P1 - P2 offset in Pa, position offset as share of the stroke.
+    :return: value and standard deviation, NaN where the unit is not known well enough. Friction
+        and spring as shares, preload in N, gains as the sensor's gain error, P1 - P2 offset in
+        Pa, position offset as share of the stroke.
     """
     value, std = s.value[m][h], s.sd[m][h]
     if h == FRICTION:
@@ -56,6 +60,17 @@ def physical_value(s: Any, c: Any, m: int, h: int) -> tuple[float, float]:
         F_unit = max(s.unit[SIGN] + s.unit[V] * v, SMALL_FRICTION)
         cov = s.unit_cov
         variance = cov[SIGN, SIGN] + 2.0 * v * cov[V, SIGN] + v * v * cov[V, V]
+        late = v * s.unit[X1] * c.ps_lag_std  # friction that a lag not known would show
+        variance += late * late
+        if variance > (UNKNOWN * F_unit) ** 2:
+            return math.nan, math.nan
+        told = abs(s.apart[m]) > APART * s.apart_sd[m] and m == SET_SLOW
+        F_dry = max(s.unit[SIGN], SMALL_FRICTION)
+        leads = abs(s.dry[m]) * F_dry > 0.5 * abs(value) * F_unit
+        if told and leads and cov[SIGN, SIGN] < (UNKNOWN * F_dry) ** 2:
+            ratio = max(s.theta[SIGN], SMALL_FRICTION) / F_dry
+            return in_units(s.dry[m], s.dry_sd[m], ratio, cov[SIGN, SIGN] / (F_dry * F_dry))
+        std = math.sqrt(std * std + s.apart_sd[m] * s.apart_sd[m])
         return in_units(value, std, F / F_unit, variance / (F_unit * F_unit))
     if h == SPRING:
         K = s.unit[X1]

@@ -132,6 +132,7 @@ class SignatureSettings:
     plug_floor: float = 0.0002
     lag_std: float = 0.05  # [s] prior of the lag between P1 - P2 and position
     stribeck_std: float = 0.01  # [1] prior of the friction that vanishes with speed
+    ps_lag_std: float = 0.0  # [s] how well the lag of the chamber pressure is known
     size_weight: float = 5000.0  # blocks that the unit of a size rests on in the end
     sigma_min: float = 4e-4  # [1]
     # verification (2.3b)
@@ -192,6 +193,7 @@ class SignatureSettings:
             learn=c.t_learn,
             plug_gain_std=c.plug_gain_std,
             plug_shape_std=c.plug_shape_std,
+            ps_lag_std=c.ps_lag_std,
             material_friction=c.material_friction,
             material_spring=c.material_spring,
             material_supply=c.material_supply,
@@ -266,6 +268,7 @@ REFERENCE_FIELDS: list[Any] = [
     ('unit_weight', 'f8'),
     ('air_learned', 'i8', (2,)),
     ('air_ref', 'f8', (2,)),
+    ('air_ref_ps', 'f8', (2,)),  # [Pa] 0: not known
 ]
 REFERENCE_DTYPE = _record(REFERENCE_FIELDS)
 
@@ -320,6 +323,11 @@ STATE_DTYPE = _record(
         ('logp', 'f8', (N_SETS, N_HYP)),
         ('value', 'f8', (N_SETS, N_HYP)),
         ('sd', 'f8', (N_SETS, N_HYP)),
+        # friction: share of the dry part alone, and by how much it differs from that of all
+        ('dry', 'f8', (N_SETS,)),
+        ('dry_sd', 'f8', (N_SETS,)),
+        ('apart', 'f8', (N_SETS,)),
+        ('apart_sd', 'f8', (N_SETS,)),
         ('d_max', 'f8', (N_SETS,)),
         # cues
         ('stick', 'i8'),

@@ -37,6 +37,9 @@ from damadics_fd.core.signature.state import (
     CAUSE_SPRING_SOFTER,
     CAUSE_SPRING_STIFFER,
     CAUSE_SUPPLY,
+    CAUSE_UNDETERMINED,
+    FAMILY_UNCONFIRMED,
+    FAMILY_UNDETERMINED,
     SET_ALARM,
     SET_SLOW,
     SET_UNIT,
@@ -165,6 +168,23 @@ def own_level(s: Any, c: Any) -> int:
 
 
 @jit
+def persists(s: Any, c: Any) -> bool:
+    """
+    Tell whether a named change is still there, as the evidence since the alarm says.
+
+    :param s: state record.
+    :param c: settings record.
+    :return: True while neither alarm may end.
+    """
+    if s.state != STATE_ALARM or s.family in (FAMILY_UNDETERMINED, FAMILY_UNCONFIRMED):
+        return False
+    if s.cause == CAUSE_SUPPLY:
+        return supply_lost(s, c)
+    present: bool = max(s.D[SET_ALARM], s.D[SET_SLOW]) > c.d_decide
+    return present
+
+
+@jit
 def material(s: Any, c: Any, before: bool) -> bool:
     """
     Tell whether the present change matters for maintenance (2.8).
@@ -172,8 +192,13 @@ def material(s: Any, c: Any, before: bool) -> bool:
     :param s: state record.
     :param c: settings record.
     :param before: whether it mattered before; a change about the limit does not chatter.
-    :return: False for a named friction or spring change that is certainly small.
+    :return: False for a named friction or spring change that is certainly small, and of the own
+        alarm until the size is known.
     """
+    if s.cause == CAUSE_UNDETERMINED and s.own != 0:
+        return bool((s.t - s.alarm_t) * 1e-9 >= c.unconfirmed_after)
+    if math.isnan(s.cause_value):
+        return True
     share = HYSTERESIS if before else 1.0
     most = abs(s.cause_value) + 2.0 * s.cause_std
     if s.cause in (CAUSE_FRICTION_UP, CAUSE_FRICTION_DOWN):

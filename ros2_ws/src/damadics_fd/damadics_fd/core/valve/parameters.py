@@ -90,6 +90,9 @@ class Valve(Section):
         10.0,
         0.0,
     )
+    ps_lag_std: float = number(
+        's', 'how well that damping is known: its standard deviation', 0.0, 10.0, 0.0
+    )
 
     @property
     def air_sign(self) -> float:
