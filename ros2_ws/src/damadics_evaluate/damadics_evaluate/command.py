@@ -7,6 +7,7 @@ import math
 import sys
 from pathlib import Path
 
+from damadics_evaluate import detectability
 from damadics_evaluate.baselines import DETECTORS, MissingPackageError
 from damadics_evaluate.baselines.classifiers import train
 from damadics_evaluate.benchmark.campaign import Campaign
@@ -114,6 +115,7 @@ def _parser() -> argparse.ArgumentParser:
     versus.add_argument('--csv', type=Path, help='write all rows here')
     lublin.add_parser(commands)
     recordings.add_parser(commands)
+    detectability.add_parser(commands)
     check = commands.add_parser('check', help='test a detector: finite, repeatable, causal')
     check.add_argument('detectors', nargs='+', metavar='my.py:Class')
     return parser
@@ -135,6 +137,7 @@ def main(argv: list[str] | None = None) -> int:
             'paper': _paper,
             'lublin': lublin.lublin,
             'recordings': recordings.recordings,
+            'detectability': detectability.detectability,
             'check': _check,
         }
         return commands[arguments.command](arguments) or 0

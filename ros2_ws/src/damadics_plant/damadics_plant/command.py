@@ -16,6 +16,7 @@ from typing import Any
 
 from damadics_fd.bag.errors import BagError
 
+from damadics_plant.actuator.twin import read_twin
 from damadics_plant.export import ALL, Job, run_all, run_one
 from damadics_plant.faults.catalogue import CATALOGUE, Fault
 from damadics_plant.scenarios.library import load_scenario, scenario_names
@@ -70,6 +71,12 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument('--list', action='store_true', help='list the scenarios and exit')
     p.add_argument('--faults', action='store_true', help='list the faults and exit')
     p.add_argument('--model', choices=list(MODELS), default='dablib')
+    p.add_argument(
+        '--valve',
+        type=Path,
+        metavar='FILE',
+        help='the twin of a valve, written by commission --twin, in place of --model',
+    )
     p.add_argument(
         '--rate',
         type=float,
@@ -191,12 +198,13 @@ def main(args: Sequence[str] | None = None) -> int:
         names[names.index(ALL) : names.index(ALL) + 1] = standard
     warnings.showwarning = lambda message, *_: print(f'simulate: {message}', file=sys.stderr)
     try:
+        model = read_twin(arguments.valve) if arguments.valve else arguments.model
         jobs = [
             Job(
                 scenario_from(name, arguments),
                 arguments.out,
                 arguments.rate,
-                arguments.model,
+                model,
                 arguments.noise,
                 arguments.seed,
             )

@@ -16,6 +16,7 @@ from typing import Any, Protocol
 import numpy as np
 from tqdm import tqdm
 
+from damadics_plant.actuator.parameters import Actuator
 from damadics_plant.scenarios.scenario import Scenario
 from damadics_plant.simulator import Simulator
 from damadics_plant.writer import BYTES_PER_SAMPLE, open_writer
@@ -45,7 +46,7 @@ class Job:
     scenario: Scenario
     out: Path
     rate: float | None = None
-    model: str = 'dablib'
+    model: str | Actuator = 'dablib'
     noise: bool = False
     seed: int = 0
 

@@ -21,6 +21,7 @@ from rclpy.node import Node
 from rosgraph_msgs.msg import Clock as ClockMessage
 
 from damadics_plant import Simulator
+from damadics_plant.actuator.twin import read_twin
 
 DESCRIPTION = 'Simulate the actuator and publish its signals and its faults at the sample rate.'
 EXAMPLES = """examples:
@@ -55,6 +56,7 @@ class Plant(Node):
             'rate', 400.0, 'samples per second of scenario time [Hz]', limits=(1.0, 1000.0)
         )
         model = declare('model', 'dablib', 'model of the actuator', allowed=MODELS)
+        valve = declare('valve', '', 'file of a twin, written by commission --twin; for model')
         noise = declare('noise', False, 'add the noise of the benchmark')
         seed = declare('seed', 0, 'seed of the noise and of random inputs', limits=(0, 2**31 - 1))
         self._factor = declare(
@@ -80,10 +82,15 @@ class Plant(Node):
         parameters.check()
         try:
             self._simulator = Simulator(
-                scenario, rate=rate, model=model, noise=noise, seed=seed, duration=duration or None
+                scenario,
+                rate=rate,
+                model=read_twin(valve) if valve else model,
+                noise=noise,
+                seed=seed,
+                duration=duration or None,
             )
         except ValueError as problem:
-            parameters.check(f'scenario: {problem}')
+            parameters.check(f'{"valve" if valve else "scenario"}: {problem}')
         self._measurement = self.create_publisher(Measurement, 'measurement', qos.SAMPLES)
         self._fault_state = self.create_publisher(FaultState, 'fault_state', qos.SAMPLES)
         self.create_service(InjectFault, 'inject_fault', self._inject)

@@ -196,7 +196,11 @@ class Chain:
 
         :return: for people; never "monitoring" while it does not monitor.
         """
-        return self.estimator.status
+        status = self.estimator.status
+        lacking = self.signature.lacking if self.settings.mode == 'monitor' else ''
+        if not self.estimator.monitoring or not lacking:
+            return status
+        return f'{status}; {lacking}'
 
     @property
     def refused(self) -> dict[str, int]:

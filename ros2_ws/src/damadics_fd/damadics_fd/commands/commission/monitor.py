@@ -53,6 +53,7 @@ class Proposal:
     remarks: tuple[str, ...]
     limiting: tuple[str, ...]  # why the verdict is not ok
     refusing: tuple[str, ...]  # why it is refused
+    sheet_diameter: float  # [m] of the plug, as stated
 
     @property
     def verdict(self) -> str:
@@ -162,6 +163,7 @@ def _propose(
         tuple(remarks),
         tuple(limiting),
         tuple(refusing),
+        sheet.plug_diameter,
     )
 
 

@@ -145,7 +145,7 @@ def table_force(s: Any, c: Any, x: float, dp: float) -> float:
 @jit
 def regressor(s: Any, c: Any, slow: float) -> None:
     """
-    Fill the regressor of the model and of every hypothesis (2.2, 2.4).
+    Fill the regressor of the model and of every hypothesis.
 
     :param s: state record: x, v and the middle block are read, ph is written.
     :param c: settings record.

@@ -1,6 +1,6 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""From evidence to a named cause: families first, "undetermined" as an honest answer (2.7-2.9)."""
+"""From evidence to a named cause: families first, "undetermined" as an honest answer."""
 
 import math
 from typing import Any
@@ -55,7 +55,7 @@ D_VERIFY = 12.0  # largest D expected of a right model
 @jit
 def watch(s: Any, c: Any) -> None:
     """
-    Look for a change on the three memories before any alarm (2.8).
+    Look for a change on the three memories before any alarm.
 
     A set is evaluated as often as its memory can change, and at every block once D is not
     small. Where the whole misfit is below a limit, D is below it too and need not be computed.
@@ -160,7 +160,7 @@ def moving_unchanged(s: Any, c: Any, D: float) -> bool:
 @jit
 def doubt(s: Any, c: Any) -> None:
     """
-    Say so if the moving valve does not confirm an alarm (2.9).
+    Say so if the moving valve does not confirm an alarm.
 
     :param s: state record.
     :param c: settings record.

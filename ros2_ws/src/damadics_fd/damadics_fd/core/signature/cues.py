@@ -1,6 +1,6 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Physical cues: what only friction, and what friction never can do (2.6)."""
+"""Physical cues: what only friction, and what friction never can do."""
 
 from typing import Any
 

@@ -5,7 +5,7 @@ Evidence for each hypothesis from exponentially weighted sums over moving blocks
 
 Every hypothesis adds one or two columns to the reference model. The error of the reference
 is common to all of them, so it is eliminated once (Schur complement) and each hypothesis is a
-division. The result equals the restricted least squares of the specification term by term.
+division. The result equals the restricted least squares of each hypothesis term by term.
 """
 
 import math
@@ -173,7 +173,7 @@ def combine(
 @jit
 def evaluate(s: Any, c: Any, m: int, eps: float, b_r: float, b_p: float) -> float:
     """
-    Weigh the hypotheses on one set (2.5).
+    Weigh the hypotheses on one set.
 
     :param s: state record; logp, value, sd and D of the set are written.
     :param c: settings record.

@@ -100,7 +100,7 @@ def learning_progress(s: Any, c: Any) -> float:
 @jit
 def finish_learning(s: Any, c: Any) -> bool:
     """
-    Compute the reference if the valve has moved enough (2.3).
+    Compute the reference if the valve has moved enough.
 
     :param s: state record; theta, J0, sigma and r_ref are written.
     :param c: settings record.
@@ -250,7 +250,7 @@ def prior_precision(Pi: Any, c: Any, work: Any, n: int) -> None:
 @jit
 def widen_reference(s: Any, kappa: float) -> None:
     """
-    Take the misfit seen in VERIFY into the noise and the error of the reference (2.3b).
+    Take the misfit seen in VERIFY into the noise and the error of the reference.
 
     :param s: state record.
     :param kappa: factor on the standard deviations, at least 1.

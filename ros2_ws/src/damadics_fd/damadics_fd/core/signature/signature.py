@@ -15,9 +15,11 @@ from damadics_fd.core.signature.reference import learning_progress
 from damadics_fd.core.signature.state import (
     CAUSE_ELASTIC,
     CAUSES,
+    MIN_RATE,
     REFERENCE_DTYPE,
     STATE_ALARM,
     STATE_DTYPE,
+    STATE_INSUFFICIENT,
     STATE_MONITOR,
     STATE_VERIFY,
     X1,
@@ -103,6 +105,24 @@ class Signature:
         if self.state['state'][0] >= STATE_VERIFY:
             return 1.0
         return float(learning_progress(self.state[0], self.record[0]))
+
+    @property
+    def lacking(self) -> str:
+        """
+        Say what cannot be seen, and what to do.
+
+        :return: '' where nothing is missing, or learning goes on as it should.
+        """
+        if not self.settings.available:
+            slow = self.settings.sample_period > 1.0 / MIN_RATE
+            return f'causes are unavailable below {MIN_RATE:g} Hz' if slow else ''
+        if self.state['state'][0] != STATE_INSUFFICIENT:
+            return ''
+        return (
+            'causes and small faults are unavailable: moves were too small or too few to learn '
+            f'the force balance ({100.0 * self.progress:.0f} %); give the valve some strokes of '
+            f'{self.settings.learn_range:g} of its range, both ways'
+        )
 
     def save(self) -> dict[str, Any]:
         """

@@ -111,14 +111,14 @@ class SignatureSettings:
     plug_km: tuple[float, ...] = RECOVERY  # [1] Km(X): plug force (P1 - P2) / Km * plug_area
     available: bool = True  # False: nothing is done
     sample_period: float = 0.005  # [s] nominal
-    # blocks (2.1)
+    # blocks
     block: float = 0.1  # [s] Tb: a multiple of the periods of 50 Hz and 60 Hz
     range_gate: float = 0.03  # [1] end stops and the steep end of the plug table
     v_min: float = 0.02  # [1/s]
     v_max: float = 1.5  # [1/s]
     v_stribeck: float = 0.026  # [1/s] vs / L
     stribeck_weight: float = 40.0  # [1] ((fs - fc) / (FN sigma))^2
-    # reference (2.3)
+    # reference
     start: float = 5.0  # [s] the filters settle
     learn: float = 60.0  # [s]
     learn_blocks: int = 40  # moving blocks in each direction
@@ -135,19 +135,19 @@ class SignatureSettings:
     ps_lag_std: float = 0.0  # [s] how well the lag of the chamber pressure is known
     size_weight: float = 5000.0  # blocks that the unit of a size rests on in the end
     sigma_min: float = 4e-4  # [1]
-    # verification (2.3b)
+    # verification
     verify: float = 60.0  # [s]
     verify_blocks: int = 60  # moving blocks
     kappa_max: float = 3.0
     own_alarm: bool = True
-    # evidence (2.4, 2.5)
+    # evidence
     memory: tuple[float, float, float, float] = (6.0, 30.0, 300.0, 30.0)
     change_std: tuple[float, ...] = (0.5, 0.2, 1.0, 0.2, 0.3, 0.3, 0.3, 0.1)  # v s | h = 2..7
     growth_std: tuple[float, float] = (0.3, 1.0)  # friction, spring: change in 10 s
     prior: tuple[float, ...] = (1.0, 0.45, 0.45, 0.03, 0.03, 0.03, 0.03, 0.03)
     model_error: float = 0.2  # eps
     model_error_stage2: float = 0.03
-    # decision (2.6 - 2.9)
+    # decision
     d_decide: float = 30.0
     d_alarm: float = 40.0
     p_firm: float = 0.95
@@ -155,7 +155,7 @@ class SignatureSettings:
     n_alarm: int = 3
     stage2_delay: float = 10.0  # [s]
     unconfirmed_after: float = 60.0  # [s]
-    # material changes (2.8): smaller ones are reported without a maintenance level
+    # material changes: smaller ones are reported without a maintenance level
     material_friction: float = 0.3
     material_spring: float = 0.02
     # supply pressure from the top speed

@@ -187,7 +187,7 @@ def persists(s: Any, c: Any) -> bool:
 @jit
 def material(s: Any, c: Any, before: bool) -> bool:
     """
-    Tell whether the present change matters for maintenance (2.8).
+    Tell whether the present change matters for maintenance.
 
     :param s: state record.
     :param c: settings record.
@@ -301,7 +301,7 @@ def monitor_block(s: Any, c: Any) -> bool:
 @jit
 def finish_verification(s: Any, c: Any) -> None:
     """
-    Leave VERIFY and widen the reference by the misfit seen (2.3b).
+    Leave VERIFY and widen the reference by the misfit seen.
 
     :param s: state record.
     :param c: settings record.

@@ -1,0 +1,163 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""A twin: the constants of the simulated LuGre actuator that moves as the valve did."""
+
+from pathlib import Path
+
+import numpy as np
+
+from damadics_fd.commands.commission.balance import regressor
+from damadics_fd.commands.commission.errors import CommissioningError
+from damadics_fd.commands.commission.monitor import Proposal
+from damadics_fd.commands.commission.signals import Blocks, Signals, blocks, gather
+from damadics_fd.commands.commission.valve_file import quoted, value_text
+from damadics_fd.core.identified import FaultFree
+from damadics_fd.core.record import Floats
+from damadics_fd.core.settings import Settings
+
+ATMOSPHERE, GAS = 101325.0, 287.0 * 293.0  # Pa; R T of air [J/kg]
+FINE = 0.05  # s
+TOP = 95.0  # percentile of the flow that counts as full opening
+LEAST_DRIVE = 3e4  # Pa
+BRISTLE = 2e-5  # m by which the stem gives before it breaks away
+STRIBECK = 1e-3  # m/s
+VENTING = 0.55  # of the booster's opening, at most, where it vents
+STEP = 0.05  # of the stroke; smaller steps of the command do not count
+LOOK = 3.0  # s after a step
+TWIN = 'twin'
+
+
+def write_twin(proposal: Proposal, path: Path, actuator: str = '') -> None:
+    """
+    Write the file that `simulate --valve` and `plant` take.
+
+    :param proposal: what commission found in mode monitor.
+    :param path: of the file.
+    :param actuator: tag of the valve.
+    :raises CommissioningError: for a valve that the simulated actuator cannot be.
+    :raises OSError: where the file cannot be written.
+    """
+    constants = twin(proposal)
+    lines = [
+        '# twin of a valve, written by commission: run it with',
+        '#   ros2 run damadics_plant simulate nominal --valve FILE --out run.mcap',
+        f'{TWIN}:',
+        f'  actuator: {quoted(actuator)}',
+        f'  sample_rate: {value_text(proposal.settings.sample_rate)}',
+    ]
+    lines += [f'  {name}: {value_text(value)}' for name, value in constants.items()]
+    lines.append('settings:')
+    usual = Settings.for_mode('monitor').to_dict()
+    for name, value in proposal.settings.to_dict().items():
+        if value != usual[name]:
+            lines.append(f'  {name}: {value_text(value)}')
+    path.write_text('\n'.join(lines) + '\n', encoding='utf-8')
+
+
+def twin(proposal: Proposal) -> dict[str, float]:
+    """
+    Return the constants of the simulated actuator.
+
+    :param proposal: what commission found in mode monitor.
+    :return: by the names of `damadics_plant.LuGreActuator`, SI units, plug_diameter in mm.
+    :raises CommissioningError: for a valve that the simulated actuator cannot be.
+    """
+    s, b = proposal.settings, proposal.balance
+    if s.air_to != 'close' or s.flow_to != 'open':
+        raise CommissioningError(
+            'no twin: the simulated actuator is closed by air and opened by the flow, this valve '
+            f'has air to {s.air_to}, flow to {s.flow_to}'
+        )
+    signals = gather([FaultFree('all', {**proposal.columns})])
+    fine = blocks(signals, FINE, s.ps_lag)
+    static = max(breakaway(proposal, fine), b.friction)
+    fill, vent = capacities(fine, s)
+    dry = max(b.friction, 1e-3 * s.stiffness * s.stroke)
+    gain = b.gain if s.plug_diameter > 0.0 else 0.0
+    return {
+        'stroke': s.stroke,
+        'mass': s.mass,
+        'stiffness': s.stiffness,
+        'preload': s.preload * s.stroke,
+        'viscous': b.viscous,
+        'area': s.area,
+        'dead_volume': s.chamber_volume,
+        'gravity': s.gravity,
+        'supply': s.supply_pressure,
+        'air_flow': max(fill, vent / VENTING),
+        'lag': response(signals),
+        'plug_diameter': 1e3 * proposal.sheet_diameter * float(np.sqrt(gain)),
+        'coulomb': dry,
+        'static': max(static, 1.01 * dry),
+        'stribeck': STRIBECK,
+        'bristle_stiffness': max(static, dry) / BRISTLE,
+        'bristle_damping': 2.0 * float(np.sqrt(s.mass * max(static, dry) / BRISTLE)),
+    }
+
+
+def breakaway(proposal: Proposal, b: Blocks) -> float:
+    """
+    Return the friction that the stem overcomes when it begins to move.
+
+    :param proposal: what commission found.
+    :param b: blocks, delayed as the settings say.
+    :return: [N], the median over the strokes; 0 where none began in mid-stroke.
+    """
+    s = proposal.settings
+    force, _, _ = regressor(b, s)
+    left = force - s.stiffness * s.stroke * (b.x + s.spring_origin)
+    begins = np.flatnonzero(b.standing[:-2] & b.moving[2:] & (b.index[2:] - b.index[:-2] == 2))
+    if not len(begins):
+        return 0.0
+    borne = np.maximum(left[begins] * np.sign(b.v[begins + 2]), 0.0)
+    return float(np.median(borne))
+
+
+def capacities(b: Blocks, s: Settings) -> tuple[float, float]:
+    """
+    Return the flow factors of filling and venting at full opening.
+
+    :param b: blocks of the recording.
+    :param s: settings with supply_pressure, chamber_volume, area, stroke.
+    :return: [kg/(s sqrt(Pa))] each.
+    :raises CommissioningError: where the chamber never fills or never vents.
+    """
+    air = (ATMOSPHERE + b.ps) * (s.chamber_volume + s.area * s.stroke * b.x) / GAS
+    near = np.diff(b.index) == 1
+    flow = np.diff(air)[near] / b.width
+    ps = (0.5 * (b.ps[1:] + b.ps[:-1]))[near]
+
+    def top(rate: Floats, drive: Floats) -> float:
+        use = (rate > 0.0) & (drive > LEAST_DRIVE)
+        if use.sum() < 10:
+            raise CommissioningError('no twin: the chamber is never filled or never vented')
+        return float(np.percentile(rate[use] / np.sqrt(drive[use]), TOP))
+
+    return top(flow, s.supply_pressure - ps), top(-flow, ps)
+
+
+def response(signals: Signals) -> float:
+    """
+    Return the time constant of the positioner's set-point filter, from when the air answers.
+
+    The filter has two equal lags; the air answers when its output has gone 4 % of a step, after
+    0.3 time constants.
+
+    :param signals: the samples.
+    :return: [s].
+    """
+    jumps = np.flatnonzero(np.abs(np.diff(signals.cv)) > STEP)
+    still = round(1.0 * signals.rate)
+    waits = []
+    for i in jumps[:400]:
+        before = signals.ps[max(0, i - still) : i]
+        after = signals.ps[i + 1 : i + 1 + round(LOOK * signals.rate)]
+        if len(before) < still // 2 or len(after) < 10:
+            continue
+        noise = float(np.std(np.diff(before)))
+        moved = np.flatnonzero(np.abs(after - before[-5:].mean()) > 6.0 * noise + 200.0)
+        if len(moved) and float(np.ptp(before)) < 12.0 * noise + 1e3:
+            waits.append(moved[0] / signals.rate)
+    if not waits:
+        return 0.3
+    return float(min(max(np.median(waits) / 0.3, 0.02), 5.0))
