@@ -7,6 +7,7 @@ import pytest
 from damadics_fd.commands.commission.balance import find_balance
 from damadics_fd.commands.commission.signals import gather
 from damadics_fd.core.identified import FaultFree
+from damadics_fd.core.monitor import run
 from damadics_fd.core.settings import Settings
 
 from . import valve as foreign
@@ -83,3 +84,26 @@ def test_a_foreign_valve_is_watched_without_alarm_and_its_fault_named(change):
         assert t.delay < 60.0
         assert t.right, t.cause
         assert np.isnan(t.size) or t.size == pytest.approx(t.true, rel=0.15)
+
+
+@pytest.mark.parametrize('wrong', ['stroke', 'stiffness', 'area', 'everything'])
+def test_constants_of_another_valve_never_arm(wrong):
+    build = foreign.CATALOGUE['G100' if wrong == 'everything' else 'G38']
+    columns = foreign.simulate(build, foreign.steps(400.0, 31), seed=31)
+    right = {'stroke': 0.0381, 'stiffness': 61e3, 'area': 0.029, 'alpha4': 20333.0}
+    given = {} if wrong == 'everything' else {wrong: 1.6 * right[wrong]}
+    result = run(columns, Settings.for_mode('monitor', **given))
+    assert not result.estimator.monitoring
+    assert 'not those of this valve' in result.estimator.status
+    assert 'run commission' in result.estimator.status
+
+
+def test_a_standing_fault_is_one_occurrence():
+    build = foreign.random_valve(26)
+    proposal = commissioned(build, 26)
+    for fault in ('friction +300 %', 'spring -20 %'):
+        t = trial(build, proposal, fault, 26, quiet=300.0, after=1500.0)
+        assert (t.false_alarms, t.occurrences) == (0, 1)
+    loop = foreign.control(1800.0, 26)
+    t = trial(build, proposal, 'friction +300 %', 26, quiet=300.0, after=1500.0, cv=loop)
+    assert t.occurrences <= 1
