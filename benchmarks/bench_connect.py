@@ -10,6 +10,7 @@ CPU time per changed value of both, start, memory, and whether every change came
 import argparse
 import asyncio
 import os
+import socket
 import subprocess
 import sys
 import tempfile
@@ -36,6 +37,15 @@ def memory(pid: int) -> float:
         if line.startswith('VmRSS'):
             return int(line.split()[1]) / 1024
     return 0.0
+
+
+def wait_for_port(port: int) -> None:
+    """Wait until the server listens."""
+    while True:
+        with socket.socket() as probe:
+            if probe.connect_ex(('127.0.0.1', port)) == 0:
+                return
+        time.sleep(0.5)
 
 
 async def bare(url: str, valves: int, fast: int, seconds: float) -> None:
@@ -130,7 +140,7 @@ def main() -> None:
     try:
         server = subprocess.Popen([sys.executable, str(SERVER), str(options.port), *size])
         children.append(server)
-        time.sleep(10.0)
+        wait_for_port(options.port)
         library = Follower([sys.executable, __file__, '--bare', *sys.argv[1:]])
         children.append(library.process)
         began = time.monotonic()

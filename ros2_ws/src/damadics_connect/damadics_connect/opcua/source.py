@@ -67,6 +67,7 @@ class Source:
         self._feeds = [Feed(period, group, options, output) for period, group in by_period.items()]
         self._joiners = {n: joiner for feed in self._feeds for n, joiner in feed.joiners.items()}
         self._heard = 0.0  # monotonic time of the server's last word
+        self._ended = False  # the server has ended a subscription
         self._fault = 'not connected yet'
         self._unknown: dict[str, str] = {}
         self._sessions = self._values = self._lost = self._garbled = 0
@@ -110,6 +111,7 @@ class Source:
     async def _follow(self, client: Client) -> None:
         """Subscribe to everything, then look after it until the server falls silent."""
         self._heard = time.monotonic()
+        self._ended = False
         self._unknown.clear()
         spaces = await client.get_namespace_array()
         polled = []
@@ -127,6 +129,10 @@ class Source:
         try:
             while True:
                 await asyncio.sleep(tick)
+                if self._ended:
+                    raise SessionError(
+                        f'{shown(self._endpoint.url)}: the server has ended our subscription'
+                    )
                 silent = time.monotonic() - self._heard
                 if silent > QUIET + max(feed.interval for feed in self._feeds):
                     raise SessionError(
@@ -209,7 +215,7 @@ class Source:
                     continue
                 self._take_changes(feed, changes, result.NotificationMessage.PublishTime)
             elif isinstance(notification, ua.StatusChangeNotification):
-                self._heard = 0.0  # the server has ended the subscription: begin again
+                self._ended = True
 
     def _take_changes(self, feed: Feed, changes: Changes, server: datetime | None) -> None:
         now = time.monotonic_ns()
