@@ -47,6 +47,7 @@ class Feed:
         self.period = period
         half = min(max(period / 2.0, SHORTEST_INTERVAL), LONGEST_INTERVAL)
         self.interval = options.interval or half
+        self.tick = min(max(self.interval / 2.0, 0.01), 0.1)  # s between two looks
         self.queue = options.queue or round((self.interval + HELD_UP) / period) + 2
         self.items: list[Item] = []
         self.nodes: list[str] = []
@@ -63,3 +64,12 @@ class Feed:
             for signal in valve.signals:
                 self.items.append(Item(valve.name, signal.slot, signal.scale, joiner))
                 self.nodes.append(signal.source)
+
+    def look(self, now: int) -> None:
+        """
+        Emit what is due of every valve.
+
+        :param now: monotonic time [ns].
+        """
+        for joiner in self.joiners.values():
+            joiner.look(now)

@@ -28,6 +28,7 @@ from damadics_connect.settings import shown
 from damadics_connect.valve_list import ValveSource
 
 KEEP_ALIVE = 0.5  # s between two words of a server that has nothing new
+HELD_UP = 0.5  # s that our own process may be late before its lateness counts
 QUIET = 1.2  # s without a word after which the session counts as lost
 PAUSES = (0.2, 0.5, 1.0, 2.0, 5.0)  # s before it is tried again
 AT_ONCE = 1000  # monitored items of one request
@@ -125,10 +126,15 @@ class Source:
         self._log(f'connected to {shown(self._endpoint.url)}: {len(self._joiners)} valve(s)')
         if self._unknown:
             self._log(f'no such node: {some([f"{n} ({c})" for n, c in self._unknown.items()])}')
-        tick = min(max(min(feed.interval for feed in self._feeds) / 2.0, 0.01), 0.1)
+        tick = min(feed.tick for feed in self._feeds)
+        due = dict.fromkeys(range(len(self._feeds)), 0.0)
         try:
             while True:
+                asleep = time.monotonic()
                 await asyncio.sleep(tick)
+                held_up = time.monotonic() - asleep - tick
+                if held_up > HELD_UP:
+                    self._heard += held_up  # it is us who were: what has come waits to be read
                 if self._ended:
                     raise SessionError(
                         f'{shown(self._endpoint.url)}: the server has ended our subscription'
@@ -142,9 +148,10 @@ class Source:
                 for task in polled:
                     if task.done():
                         task.result()
-                now = time.monotonic_ns()
-                for joiner in self._joiners.values():
-                    joiner.look(now)
+                for number, feed in enumerate(self._feeds):
+                    if (now := time.monotonic()) >= due[number]:
+                        due[number] = now + feed.tick
+                        feed.look(time.monotonic_ns())
                 self._output.flush()
         finally:
             for task in polled:
@@ -235,8 +242,7 @@ class Source:
             elif item.joiner.tally.bad:
                 item.joiner.tally.bad.pop(SIGNALS[item.slot], None)
             item.joiner.take(item.slot, changes.stamp[n] or wall, item.scale(value), now)
-        for joiner in feed.joiners.values():
-            joiner.look(now)
+        feed.look(now)
         self._output.flush()
 
     def _judge(self, item: Item, status: int, value: float, kind: str) -> float:
