@@ -20,10 +20,10 @@ from collections import defaultdict
 from pathlib import Path
 
 import rclpy
-from damadics_bringup.fleet import Valve
 from damadics_bringup.launcher import Task, tasks_of
 from damadics_bringup.processes import Processes, free_domain, surroundings
 from damadics_fd.ros import qos
+from damadics_fd.store.fleet_file import Valve
 from damadics_msgs.msg import FaultFlag
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.context import Context

@@ -16,10 +16,10 @@ from types import ModuleType, SimpleNamespace
 import pytest
 import yaml
 from ament_index_python.packages import get_package_share_directory
-from damadics_bringup.fleet import FleetError, Valve, read_fleet
 from damadics_bringup.launcher import tasks_of
 from damadics_bringup.policy import policy
 from damadics_bringup.processes import executable, parameters
+from damadics_fd.store.fleet_file import FleetError, Valve, read_fleet
 from damadics_msgs import msg
 
 SHARE = Path(get_package_share_directory('damadics_bringup'))

@@ -8,11 +8,11 @@ from types import SimpleNamespace
 
 import pytest
 from conftest import Peer, alone
-from damadics_bringup.fleet import Valve as FleetEntry
 from damadics_bringup.launcher import arguments_of
 from damadics_bringup.policy import policy
 from damadics_bringup.processes import Processes, executable, parameters, surroundings
 from damadics_fd.ros import qos
+from damadics_fd.store.fleet_file import Valve as FleetEntry
 from damadics_msgs.msg import FaultEvent, FaultFlag, Measurement
 from damadics_msgs.srv import Acknowledge, Relearn, ResetAlarm, Shelve
 from driven_valve import SETTINGS, Valve, start

@@ -12,8 +12,7 @@ from damadics_fd.core.text import NAME as LONGEST
 from damadics_fd.core.text import plain
 from damadics_fd.ros.arguments import command_parser, split_ros_args
 from damadics_fd.store.file_names import file_name
-
-from damadics_bringup.fleet import NAME, read_fleet
+from damadics_fd.store.fleet_file import NAME, read_fleet
 
 EXAMPLES = """examples:
   ros2 run damadics_bringup init my_plant                      asks

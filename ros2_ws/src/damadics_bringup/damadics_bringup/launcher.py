@@ -15,9 +15,10 @@ from damadics_fd.core.record import Saved
 from damadics_fd.ros.arguments import command_parser, state_folder
 from damadics_fd.start import missing_middleware
 from damadics_fd.store.access import AccessError
+from damadics_fd.store.fleet_file import FleetError, Valve, read_fleet
 from damadics_fd.store.slots import check_folder
 
-from damadics_bringup.fleet import MONITORS, FleetError, Valve, read_fleet, simulated, spread
+from damadics_bringup.fleet import MONITORS, simulated, spread
 from damadics_bringup.keeper import USAGE, Keeper, Task
 from damadics_bringup.page_options import check_page, port
 from damadics_bringup.processes import ProcessError, Processes, assignments

@@ -10,8 +10,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from damadics_fd.ros.arguments import command_parser
+from damadics_fd.store.fleet_file import FleetError, Valve, read_fleet
 
-from damadics_bringup.fleet import MONITORS, FleetError, Valve, read_fleet, spread
+from damadics_bringup.fleet import MONITORS, spread
 
 EXAMPLES = """example:
   ros2 run damadics_bringup policy fleet.yaml --out policy.xml

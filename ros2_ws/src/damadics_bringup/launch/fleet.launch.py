@@ -5,8 +5,9 @@
 from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
-from damadics_bringup.fleet import MONITORS, read_fleet, simulated, spread
+from damadics_bringup.fleet import MONITORS, simulated, spread
 from damadics_bringup.launcher import arguments_of_all
+from damadics_fd.store.fleet_file import read_fleet
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.conditions import IfCondition

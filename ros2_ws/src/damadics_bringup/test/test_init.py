@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 import pytest
 import yaml
-from damadics_bringup.fleet import read_fleet, simulated
+from damadics_bringup.fleet import simulated
 from damadics_bringup.init import main
 from damadics_fd.core.settings.settings import Settings
+from damadics_fd.store.fleet_file import read_fleet
 
 
 @pytest.mark.parametrize('mode', ['monitor', 'scada'])

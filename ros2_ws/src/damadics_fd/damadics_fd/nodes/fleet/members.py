@@ -1,0 +1,175 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""The valves of a fleet, and one bank of monitors per mode for all of them."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import yaml
+
+from damadics_fd.core.bank import Bank
+from damadics_fd.core.decision.events import Event
+from damadics_fd.core.record import Array, Ints
+from damadics_fd.core.result import events_in
+from damadics_fd.core.settings import Settings, SettingsError
+from damadics_fd.core.settings.document import parameters_in
+from damadics_fd.core.text import NAME, plain
+from damadics_fd.nodes.fleet.blocks import Rows
+from damadics_fd.store.fleet_file import FleetError, Valve
+
+OF_NODES = ('alarm_folder', 'autostart', 'causes_file', 'input_timeout', 'max_age')
+OF_NODES += ('signature_folder',)  # parameters of the per-valve nodes that a fleet has its own of
+
+
+@dataclass(frozen=True)
+class Member:
+    """Hold one valve of the fleet."""
+
+    namespace: str  # "/lv101"
+    actuator: str  # "LV-101"
+    area: str
+    settings: Settings
+    reference: Path | None  # without ".a.json"
+    measurement: str  # topic
+
+
+class Happening(NamedTuple):
+    """Hold a transition of the alarm of one valve."""
+
+    valve: int
+    event: Event
+
+
+class Members:
+    """
+    The valves by number, and their monitors.
+
+    :param members: the valves; their order gives the numbers.
+    :param classes: least NAMUR NE 107 class of an alarm by its cause.
+    """
+
+    def __init__(self, members: Sequence[Member], classes: Sequence[int]) -> None:
+        self.all = list(members)
+        modes = [member.settings.mode for member in self.all]
+        self.banks: list[Bank] = []
+        self.numbers: list[Ints] = []  # of each bank: the numbers of its valves
+        self._bank = np.zeros(len(self.all), np.int64)
+        self._place = np.zeros(len(self.all), np.int64)
+        for mode in dict.fromkeys(modes):
+            numbers = np.array([n for n, one in enumerate(modes) if one == mode], np.int64)
+            self._bank[numbers] = len(self.banks)
+            self._place[numbers] = np.arange(len(numbers))
+            self.banks.append(Bank([self.all[n].settings for n in numbers], classes))
+            self.numbers.append(numbers)
+
+    def __len__(self) -> int:
+        """Return the number of valves."""
+        return len(self.all)
+
+    def at(self, valve: int) -> tuple[Bank, int]:
+        """
+        Find the monitor of a valve.
+
+        :param valve: its number.
+        :return: its bank, and its place there.
+        """
+        return self.banks[int(self._bank[valve])], int(self._place[valve])
+
+    def take(self, rows: Rows) -> tuple[list[Happening], int]:
+        """
+        Let the monitors judge samples.
+
+        :param rows: checked rows.
+        :return: the transitions of alarms in the order of the rows, and how many rows were refused.
+        """
+        if len(self.banks) == 1:
+            return self._take(0, rows)
+        happened: list[Happening] = []
+        refused = 0
+        bank = self._bank[rows.valve]
+        for b in range(len(self.banks)):
+            mine = bank == b
+            if mine.any():
+                signals = {name: column[mine] for name, column in rows.signals.items()}
+                some, lost = self._take(b, Rows(rows.valve[mine], rows.stamp[mine], signals))
+                happened += some
+                refused += lost
+        return happened, refused
+
+    def _take(self, b: int, rows: Rows) -> tuple[list[Happening], int]:
+        changes = self.banks[b].take(self._place[rows.valve], rows.stamp, rows.signals)
+        refused = int(np.count_nonzero(changes.reason))
+        told = np.flatnonzero(changes.decisions['transitions'])
+        happened = [
+            Happening(int(rows.valve[changes.row[n]]), event)
+            for n in told
+            for event in events_in(changes.decisions[n : n + 1])
+        ]
+        return happened, refused
+
+    def column(self, name: str, kind: type, *, estimate: bool = False) -> Array:
+        """
+        Return one field of the latest decision or estimate of every valve.
+
+        :param name: of the field.
+        :param kind: of the result.
+        :param estimate: of the estimate, not of the decision.
+        :return: shape (number of valves,).
+        """
+        out = np.empty(len(self.all), kind)
+        for bank, numbers in zip(self.banks, self.numbers, strict=True):
+            out[numbers] = (bank.estimates if estimate else bank.decisions)[name]
+        return out
+
+
+def members_of(valves: Sequence[Valve]) -> list[Member]:
+    """
+    Read the settings of a list of valves.
+
+    :param valves: the list.
+    :return: the members.
+    :raises FleetError: naming every valve with wrong settings.
+    """
+    problems: list[str] = []
+    found = list(_members(valves, problems))
+    if problems:
+        raise FleetError('\n  '.join(['the fleet cannot run:', *problems]))
+    return found
+
+
+def _members(valves: Sequence[Valve], problems: list[str]) -> Iterator[Member]:
+    known = {row['name'] for row in Settings.describe()}
+    files: dict[Path, dict[str, object]] = {}
+    for valve in valves:
+        try:
+            given: dict[str, object] = {}
+            if valve.parameters:
+                if valve.parameters not in files:
+                    files[valve.parameters] = dict(_parameters(valve.parameters))
+                given |= files[valve.parameters]
+            given |= valve.settings
+            actuator = plain(str(given.pop('actuator', '') or valve.name), NAME)
+            reference = given.pop('reference', None)
+            values = {name: value for name, value in given.items() if name not in OF_NODES}
+            unknown = sorted(set(values) - known)
+            if unknown:
+                raise SettingsError([f'there is no setting {", ".join(unknown)}'])
+            settings = Settings.from_mapping(values)
+        except (SettingsError, OSError, yaml.YAMLError) as problem:
+            problems.append(f'{valve.name}: {problem}')
+            continue
+        yield Member(
+            f'/{valve.name}',
+            actuator,
+            valve.area,
+            settings,
+            Path(str(reference)).expanduser() if reference else None,
+            valve.topics.get('measurement', f'/{valve.name}/measurement'),
+        )
+
+
+def _parameters(path: Path) -> dict[str, object]:
+    return dict(parameters_in(yaml.safe_load(path.read_text(encoding='utf-8'))))
