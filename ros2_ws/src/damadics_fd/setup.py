@@ -32,6 +32,7 @@ setup(
             'estimator = damadics_fd.start:estimator',
             'detector = damadics_fd.start:detector',
             'monitors = damadics_fd.start:monitors',
+            'fleet = damadics_fd.start:fleet',
             'recorder = damadics_fd.start:recorder',
             'evaluate = damadics_fd.commands.evaluate:main',
             'replay = damadics_fd.commands.replay.replay:main',

@@ -66,6 +66,11 @@ def detector() -> int:
     return run('damadics_fd.nodes.detector_node')
 
 
+def fleet() -> int:
+    """Run the node `fleet`."""
+    return run('damadics_fd.nodes.fleet.fleet_node')
+
+
 def monitors() -> int:
     """Run the nodes of many valves."""
     return run('damadics_fd.nodes.monitors')

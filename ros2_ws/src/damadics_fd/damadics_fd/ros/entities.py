@@ -71,6 +71,8 @@ class Entities:
         take: Callable[[M], None],
         profile: QoSProfile,
         events: SubscriptionEventCallbacks | None = None,
+        *,
+        raw: bool = False,
     ) -> None:
         """
         Make a subscription.
@@ -80,6 +82,7 @@ class Entities:
         :param take: called with each message.
         :param profile: quality of service.
         :param events: of the middleware.
+        :param raw: `take` gets the serialised message.
         """
 
         def taken(message: M) -> None:
@@ -92,7 +95,9 @@ class Entities:
                     if self._failing:
                         self._failing.pop(topic, None)
 
-        made = self._node.create_subscription(kind, topic, taken, profile, event_callbacks=events)
+        made = self._node.create_subscription(
+            kind, topic, taken, profile, event_callbacks=events, raw=raw
+        )
         self._undo.append(lambda: self._node.destroy_subscription(made))
 
     def service(

@@ -12,6 +12,13 @@ SAMPLES = QoSProfile(  # of a topic that carries samples
     durability=DurabilityPolicy.VOLATILE,
 )
 
+BLOCKS = QoSProfile(  # of a topic that carries samples of many valves
+    history=HistoryPolicy.KEEP_LAST,
+    depth=2000,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.VOLATILE,
+)
+
 
 def latched(depth: int) -> QoSProfile:
     """

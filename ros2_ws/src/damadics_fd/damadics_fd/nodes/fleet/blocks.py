@@ -35,7 +35,7 @@ class Refusal(NamedTuple):
 
 def layout_version(valves: Sequence[str], actuators: Sequence[str]) -> int:
     """
-    Number a list of valves, so that a block of another list is known for one.
+    Give a list of valves a number, so that a block of another list is told from its own.
 
     :param valves: namespaces.
     :param actuators: tags.

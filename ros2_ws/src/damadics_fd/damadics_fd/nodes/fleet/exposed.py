@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from damadics_msgs.msg import FaultEvent, FaultFlag, Measurement
+from rclpy.publisher import Publisher
 
 from damadics_fd.core.sample import SIGNALS, Sample
 from damadics_fd.core.stamps import SECOND
@@ -22,8 +23,8 @@ LITTLE_ENDIAN = b'\x00\x01'
 class Exposed(NamedTuple):
     """Hold the publishers of one valve."""
 
-    flag: 'qos.Publishing'
-    event: 'qos.Publishing'
+    flag: Publisher
+    event: Publisher
 
 
 def sample_of(data: bytes) -> Sample:
@@ -60,7 +61,7 @@ def expose(
     entities.subscription(
         Measurement,
         member.measurement,
-        lambda data: take(number, data),
+        lambda data: take(number, bytes(data)),
         qos.SAMPLES,
         raw=True,
     )

@@ -5,23 +5,34 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import yaml
+from numpy.typing import NDArray
 
 from damadics_fd.core.bank import Bank
 from damadics_fd.core.decision.events import Event
-from damadics_fd.core.record import Array, Ints
+from damadics_fd.core.record import Ints
 from damadics_fd.core.result import events_in
 from damadics_fd.core.settings import Settings, SettingsError
 from damadics_fd.core.settings.document import parameters_in
+from damadics_fd.core.signature.state import NO_CLASSES
 from damadics_fd.core.text import NAME, plain
 from damadics_fd.nodes.fleet.blocks import Rows
 from damadics_fd.store.fleet_file import FleetError, Valve
 
-OF_NODES = ('alarm_folder', 'autostart', 'causes_file', 'input_timeout', 'max_age')
-OF_NODES += ('signature_folder',)  # parameters of the per-valve nodes that a fleet has its own of
+OF_NODES = (  # parameters of the per-valve nodes of which a fleet has its own
+    'alarm_folder',
+    'autostart',
+    'causes_file',
+    'input_timeout',
+    'max_age',
+    'signature_folder',
+)
+
+
+Number = TypeVar('Number', bound=np.generic)
 
 
 @dataclass(frozen=True)
@@ -51,7 +62,7 @@ class Members:
     :param classes: least NAMUR NE 107 class of an alarm by its cause.
     """
 
-    def __init__(self, members: Sequence[Member], classes: Sequence[int]) -> None:
+    def __init__(self, members: Sequence[Member], classes: Sequence[int] = NO_CLASSES) -> None:
         self.all = list(members)
         modes = [member.settings.mode for member in self.all]
         self.banks: list[Bank] = []
@@ -83,7 +94,7 @@ class Members:
         Let the monitors judge samples.
 
         :param rows: checked rows.
-        :return: the transitions of alarms in the order of the rows, and how many rows were refused.
+        :return: the transitions of alarms in the order of the rows; how many rows were refused.
         """
         if len(self.banks) == 1:
             return self._take(0, rows)
@@ -110,7 +121,7 @@ class Members:
         ]
         return happened, refused
 
-    def column(self, name: str, kind: type, *, estimate: bool = False) -> Array:
+    def column(self, name: str, kind: type[Number], *, estimate: bool = False) -> NDArray[Number]:
         """
         Return one field of the latest decision or estimate of every valve.
 
@@ -119,7 +130,7 @@ class Members:
         :param estimate: of the estimate, not of the decision.
         :return: shape (number of valves,).
         """
-        out = np.empty(len(self.all), kind)
+        out: NDArray[Number] = np.empty(len(self.all), kind)
         for bank, numbers in zip(self.banks, self.numbers, strict=True):
             out[numbers] = (bank.estimates if estimate else bank.decisions)[name]
         return out
@@ -142,10 +153,10 @@ def members_of(valves: Sequence[Valve]) -> list[Member]:
 
 def _members(valves: Sequence[Valve], problems: list[str]) -> Iterator[Member]:
     known = {row['name'] for row in Settings.describe()}
-    files: dict[Path, dict[str, object]] = {}
+    files: dict[Path, dict[str, Any]] = {}
     for valve in valves:
         try:
-            given: dict[str, object] = {}
+            given: dict[str, Any] = {}
             if valve.parameters:
                 if valve.parameters not in files:
                     files[valve.parameters] = dict(_parameters(valve.parameters))
@@ -171,5 +182,5 @@ def _members(valves: Sequence[Valve], problems: list[str]) -> Iterator[Member]:
         )
 
 
-def _parameters(path: Path) -> dict[str, object]:
+def _parameters(path: Path) -> dict[str, Any]:
     return dict(parameters_in(yaml.safe_load(path.read_text(encoding='utf-8'))))

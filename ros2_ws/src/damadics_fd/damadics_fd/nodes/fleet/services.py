@@ -15,10 +15,10 @@ from damadics_msgs.srv import (
 )
 
 from damadics_fd.core.decision.events import Event
-from damadics_fd.core.text import SENTENCE, plain
+from damadics_fd.core.text import COMMENT, NAME, SENTENCE, plain
 from damadics_fd.nodes.fleet.keeping import Keeping
 from damadics_fd.nodes.fleet.members import Members
-from damadics_fd.nodes.operator import Answered, OperatorActions, Signed
+from damadics_fd.nodes.operator import Answered, OperatorActions, Signed, signed
 from damadics_fd.ros.entities import Entities
 
 ALL = '*'
@@ -155,8 +155,6 @@ class FleetServices:
             comment=request.comment,
         )
 
-    def _remark(self, request: Signed) -> str:
-        from damadics_fd.core.text import COMMENT, NAME
-        from damadics_fd.nodes.operator import signed
-
+    @staticmethod
+    def _remark(request: Signed) -> str:
         return signed(plain(request.user, NAME), plain(request.comment, COMMENT))

@@ -31,7 +31,9 @@ def layout_message(members: Members, version: int) -> FleetLayout:
     )
 
 
-def state_of(members: Members, ages: Floats, limits: Floats) -> tuple[Floats, Floats]:
+def state_of(
+    members: Members, ages: Floats, limits: Floats
+) -> tuple[NDArray[np.uint8], NDArray[np.int8]]:
     """
     Return state and NAMUR NE 107 class of every valve; what is old is not monitored.
 
