@@ -51,12 +51,22 @@ class Prey:
         self.executor = SingleThreadedExecutor()
         self.executor.add_node(self.node)
         self.flags: list[FaultFlag] = []
-        self.node.create_subscription(FaultFlag, 'fault_flag', self.flags.append, LATCHED)
+        self.ages: list[float] = []  # of the flags' stamps when they came [s]
+        self.came: list[float] = []  # when they came [s]
+        self.node.create_subscription(FaultFlag, 'fault_flag', self.heed, LATCHED)
         self.samples = self.node.create_publisher(Measurement, 'measurement', 1000)
         self.zero = time.monotonic()
         self.sent = 0
         self.processes: dict[str, subprocess.Popen[bytes]] = {}
         self.clients: dict[str, object] = {}
+
+    def heed(self, flag: FaultFlag) -> None:
+        """Note a flag and its age."""
+        now = time.monotonic()
+        stamp = flag.header.stamp.sec + 1e-9 * flag.header.stamp.nanosec
+        self.flags.append(flag)
+        self.came.append(now)
+        self.ages.append(now - self.zero - stamp)
 
     def start(self, name: str, **values: object) -> None:
         """Start a node with parameters."""
@@ -260,12 +270,12 @@ def attack_signals(prey: Prey, count: int) -> None:
 
     def judge() -> None:
         nonlocal seen, old_since, worst
-        for flag in prey.flags[seen:]:
-            stamp = flag.header.stamp.sec + 1e-9 * flag.header.stamp.nanosec
-            age = time.monotonic() - prey.zero - stamp
+        for flag, age, came in zip(
+            prey.flags[seen:], prey.ages[seen:], prey.came[seen:], strict=True
+        ):
             if flag.state == HEALTHY and age > 2.5:
-                old_since = old_since or time.monotonic()
-                worst = max(worst, time.monotonic() - old_since)
+                old_since = old_since or came
+                worst = max(worst, came - old_since)
             else:
                 old_since = 0.0
         seen = len(prey.flags)
