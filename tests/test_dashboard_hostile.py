@@ -82,9 +82,8 @@ def test_no_text_from_outside_is_run_or_parsed(hostile, browser, address):
     if address == '/':
         shown = page.locator('[data-valve=""] .name').inner_text()
         assert '<img src=x' in shown and '\x1b' not in shown, 'it is shown as the text that it is'
-        page.locator('[data-valve=""]').hover()
     for button in page.get_by_role('button', name='Acknowledge').all()[:2]:
-        button.click()
+        button.dispatch_event('click')
         page.wait_for_timeout(300)
         page.keyboard.press('Escape')
     unharmed(page)
