@@ -25,6 +25,8 @@ _WORDS = ('history', 'depth', 'reliability', 'durability', 'liveliness')
 _CONVENTIONS = 'avoid_ros_namespace_conventions'
 _MOST_PROFILES = 100  # publishers of one topic that are kept
 _PLAIN = re.compile(r'[A-Za-z/][\w/.-]*')
+DEEPEST = 64  # lists and maps within each other
+_BRACKET = re.compile(r'[\[\]{}]')
 _INTEGER = re.compile(r'-?\d{1,19}')
 # scalars stay text, so that no tag and no date of a hostile file is ever made into something
 _LOADER = getattr(yaml, 'CBaseLoader', yaml.BaseLoader)
@@ -195,13 +197,23 @@ def load_yaml(text: str, limits: Limits = Limits()) -> Yaml | None:
 
     :return: its text, lists and maps; None where it is no YAML, too large or too deep.
     """
-    if len(text) > limits.yaml:
+    if len(text) > limits.yaml or _too_deep(text):
         return None
     try:
         loaded: Yaml = yaml.load(text, Loader=_LOADER)
         return loaded
     except (yaml.YAMLError, ValueError, RecursionError, TypeError, KeyError, AttributeError):
         return None
+
+
+def _too_deep(text: str) -> bool:
+    """Tell whether lists and maps lie too deep within each other: the parser takes its time."""
+    depth = 0
+    for match in _BRACKET.finditer(text):
+        depth += 1 if match[0] in '[{' else -1
+        if depth > DEEPEST:
+            return True
+    return '- ' * DEEPEST in text
 
 
 @lru_cache(maxsize=1024)
