@@ -167,7 +167,7 @@ def hold(stamp: NDArray, values: NDArray, at: NDArray) -> NDArray:
 def find_recordings(
     paths: Sequence[str | Path],
     topic: str | None = None,
-    maps: Mapping = {},
+    maps: Mapping[str, Source] = {},
     actuator: int | None = None,
     on_problem: Callable[[BagError], None] | None = None,
 ) -> list[Recording]:
@@ -217,7 +217,7 @@ def _entries(path: Path) -> list[Path]:
 
 
 def _recordings(
-    path: Path, topic: str | None, maps: Mapping, actuator: int | None, problems: list[BagError]
+    path: Path, topic: str | None, maps: Mapping[str, Source], actuator: int | None, problems: list[BagError]
 ) -> list[Recording]:
     """List the valves in one table or bag; `problems` gets what is left out."""
     try:
