@@ -217,7 +217,11 @@ def _entries(path: Path) -> list[Path]:
 
 
 def _recordings(
-    path: Path, topic: str | None, maps: Mapping[str, Source], actuator: int | None, problems: list[BagError]
+    path: Path,
+    topic: str | None,
+    maps: Mapping[str, Source],
+    actuator: int | None,
+    problems: list[BagError],
 ) -> list[Recording]:
     """List the valves in one table or bag; `problems` gets what is left out."""
     try:
