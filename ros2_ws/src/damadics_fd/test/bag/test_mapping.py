@@ -69,3 +69,10 @@ def test_units_are_found_whatever_their_case():
     assert parse_source('ps', 'A[BAR]').scale.factor == 1e5
     assert parse_source('ps', 'A[mPa]').scale.factor == 1e6
     assert set(units_of('cv')) == set(units_of('x1'))
+
+
+def test_the_names_of_the_signals_are_those_of_the_monitor():
+    from damadics_fd.bag.mapping import SIGNALS
+    from damadics_fd.core import sample
+
+    assert SIGNALS == sample.SIGNALS
