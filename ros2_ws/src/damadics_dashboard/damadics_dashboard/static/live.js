@@ -35,7 +35,14 @@
     // what the framework names in its own language, or not at all
     if (words.language) document.documentElement.lang = words.language;
     document.querySelectorAll('.q-uploader :is(a, input, button):not([aria-label])')
-      .forEach((element) => element.setAttribute('aria-label', words.recording_to_replay));
+      .forEach((element) => {
+        if (!element.querySelector('input')) {
+          element.setAttribute('aria-label', words.recording_to_replay);
+        } else if (element.hasAttribute('role')) { // the input inside is what takes the keyboard
+          element.removeAttribute('role');
+          element.removeAttribute('tabindex');
+        }
+      });
     const bare = document.title.replace(/^\([^)]*\) /, '');
     if (!title || bare !== title) title = bare;
     const wanted = present === 'good' ? title : `(${words.short || '!'}) ${title}`;
