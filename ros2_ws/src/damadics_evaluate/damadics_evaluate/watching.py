@@ -5,7 +5,7 @@
 from dataclasses import replace
 
 import numpy as np
-from damadics_fd.core.monitor import run
+from damadics_fd.core.monitor import Chain, run
 from damadics_fd.core.scada.estimator import ScadaEstimator
 from damadics_fd.core.settings import Settings
 
@@ -102,7 +102,7 @@ def _monitor(learning: Columns, record: Columns) -> list[Alarm]:
         raise ValueError(f'mode scada does not arm: {result.estimator.status}')
     high = np.where(result.accepted, result.decisions['fault'] != 0, False)
     alarms = alarms_of(whole['stamp'] / NANOSECONDS, high.astype(np.float64))
-    return [replace(a, cause=_cause(whole, settings, a.start)) for a in alarms]
+    return _with_causes(whole, settings, alarms)
 
 
 def learning_first(learning: Columns, record: Columns) -> Columns:
@@ -124,9 +124,18 @@ def learning_first(learning: Columns, record: Columns) -> Columns:
     return {name: np.concatenate((early[name], rest[name])) for name in names}
 
 
-def _cause(whole: Columns, settings: Settings, alarm: float) -> str:
-    """Return what mode scada names a minute after the alarm."""
-    until = whole['stamp'] <= (alarm + NAMED_AFTER_S) * NANOSECONDS
-    known = run({name: values[until] for name, values in whole.items()}, settings).estimator
-    isolation = known.monitor.isolate() if isinstance(known, ScadaEstimator) else None
-    return ' or '.join(f'f{fault}' for fault in isolation.candidates) if isolation else ''
+def _with_causes(whole: Columns, settings: Settings, alarms: list[Alarm]) -> list[Alarm]:
+    """Run once more, piece by piece, and ask mode scada a minute after each alarm."""
+    chain = Chain(settings)
+    named, done = [], 0
+    for alarm in alarms:
+        until = (alarm.start + NAMED_AFTER_S) * NANOSECONDS
+        end = int(np.searchsorted(whole['stamp'], until, side='right'))
+        if end > done:
+            chain.run({name: values[done:end] for name, values in whole.items()})
+            done = end
+        estimator = chain.estimator
+        isolation = estimator.monitor.isolate() if isinstance(estimator, ScadaEstimator) else None
+        cause = ' or '.join(f'f{fault}' for fault in isolation.candidates) if isolation else ''
+        named.append(replace(alarm, cause=cause))
+    return named
