@@ -9,6 +9,7 @@ CPU time per changed value of both, start, memory, and whether every change came
 
 import argparse
 import asyncio
+import contextlib
 import os
 import socket
 import subprocess
@@ -107,8 +108,9 @@ def main() -> None:
     options = p.parse_args()
     url = f'opc.tcp://127.0.0.1:{options.port}'
     if options.bare:
-        asyncio.run(bare(url, options.valves, options.fast, options.seconds))
-        return
+        while True:  # a busy server may lose a client while it subscribes
+            with contextlib.suppress(ConnectionError, TimeoutError):
+                asyncio.run(bare(url, options.valves, options.fast, options.seconds))
     import rclpy
     from damadics_bringup.processes import executable, free_domain, surroundings
     from damadics_fd.ros import qos
