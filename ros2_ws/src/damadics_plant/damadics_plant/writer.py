@@ -46,9 +46,9 @@ def open_writer(path: Path) -> Iterator[Write]:
 
 
 def _mcap(path: Path) -> Iterator[Write]:
-    from damadics_fd.bag.bag_writer import BagWriter
     from damadics_fd.bag.cdr.definition import schema_text
     from damadics_fd.bag.rosbag2 import qos
+    from damadics_fd.bag.writing.bag_writer import BagWriter
 
     schema_text('damadics_msgs/msg/Measurement')  # refused before there is a file
     with BagWriter(path) as bag:

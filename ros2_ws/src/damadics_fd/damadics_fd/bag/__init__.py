@@ -11,16 +11,16 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from damadics_fd.bag.bag_writer import BagWriter
     from damadics_fd.bag.columns import iter_columns, read_columns
-    from damadics_fd.bag.columns_out import write_columns
     from damadics_fd.bag.errors import BagError
+    from damadics_fd.bag.writing.bag_writer import BagWriter
+    from damadics_fd.bag.writing.columns_out import write_columns
 
 __all__ = ['BagError', 'BagWriter', 'iter_columns', 'read_columns', 'write_columns']
 _HOMES = {
     'BagError': 'errors',
-    'BagWriter': 'bag_writer',
-    'write_columns': 'columns_out',
+    'BagWriter': 'writing.bag_writer',
+    'write_columns': 'writing.columns_out',
     'iter_columns': 'columns',
     'read_columns': 'columns',
 }

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from damadics_fd.bag import inspection
 from damadics_fd.bag.cdr.definition import installed_type, schema_text
+from damadics_fd.bag.checking import inspection
+from damadics_fd.bag.checking.inspection import LOSSY, UNUSABLE, WHOLE, Report
 from damadics_fd.bag.errors import BagError
-from damadics_fd.bag.inspection import LOSSY, UNUSABLE, WHOLE, Report
 from damadics_fd.bag.limits import Limits
 from damadics_fd.bag.mcap.reader import McapFile
 from damadics_fd.bag.mcap.records import Channel, Extent, Op, Schema, parse_attachment
@@ -20,7 +20,7 @@ from damadics_fd.bag.messages import MESSAGE_HEAD, Batch, MessageFile
 from damadics_fd.bag.opening import open_file
 from damadics_fd.bag.rosbag2 import METADATA_FILE, BagFile, BagMetadata, Topic, parse_qos
 from damadics_fd.bag.sources import bag_files
-from damadics_fd.bag.whole_writes import WholeWrites
+from damadics_fd.bag.writing.whole_writes import WholeWrites
 
 ROSBAG2 = 'rosbag2'  # name of the metadata that describes a bag
 MOST_NAMELESS = 16  # channels whose record is lost that are saved

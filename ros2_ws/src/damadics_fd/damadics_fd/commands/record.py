@@ -14,10 +14,10 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from rclpy.utilities import remove_ros_args
 
-from damadics_fd.bag.bag_writer import BagWriter
-from damadics_fd.bag.blackbox import BlackBox
 from damadics_fd.bag.errors import BagError
-from damadics_fd.bag.spool import Spool
+from damadics_fd.bag.writing.bag_writer import BagWriter
+from damadics_fd.bag.writing.blackbox import BlackBox
+from damadics_fd.bag.writing.spool import Spool
 from damadics_fd.nodes.recorder import Recorder
 from damadics_fd.ros.arguments import command_parser
 from damadics_fd.ros.spin import spin_until

@@ -5,8 +5,8 @@
 import sys
 from pathlib import Path
 
+from damadics_fd.bag.checking.inspection import UNUSABLE
 from damadics_fd.bag.errors import BagError, printable
-from damadics_fd.bag.inspection import UNUSABLE
 from damadics_fd.bag.salvage import salvage
 from damadics_fd.commands.verify import print_report
 from damadics_fd.ros.arguments import command_parser

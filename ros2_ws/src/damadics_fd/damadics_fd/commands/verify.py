@@ -7,10 +7,10 @@ import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from damadics_fd.bag.checking.expectation import EXAMPLE as EXPECTATION
+from damadics_fd.bag.checking.expectation import Expected, measures, read_expectations, unmet
+from damadics_fd.bag.checking.inspection import LOSSY, UNUSABLE, WHOLE, Report, inspect
 from damadics_fd.bag.errors import BagError, printable
-from damadics_fd.bag.expectation import EXAMPLE as EXPECTATION
-from damadics_fd.bag.expectation import Expected, measures, read_expectations, unmet
-from damadics_fd.bag.inspection import LOSSY, UNUSABLE, WHOLE, Report, inspect
 from damadics_fd.bag.sources import find_bags
 from damadics_fd.ros.arguments import command_parser
 

@@ -20,7 +20,7 @@ from rclpy.subscription import Subscription
 from damadics_fd.bag import rosbag2
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.rosbag2 import Topic
-from damadics_fd.bag.spool import Spool
+from damadics_fd.bag.writing.spool import Spool
 from damadics_fd.nodes.loss_count import Sequence
 from damadics_fd.ros.graph_events import GraphEvents
 

@@ -7,7 +7,7 @@ import struct
 from pathlib import Path
 
 import pytest
-from damadics_fd.bag.inspection import WHOLE, inspect
+from damadics_fd.bag.checking.inspection import WHOLE, inspect
 from damadics_fd.bag.mcap.crc import crc32
 from damadics_fd.bag.mcap.records import HEAD, MAGIC, Op, record, string, string_map
 from damadics_fd.bag.salvage import salvage

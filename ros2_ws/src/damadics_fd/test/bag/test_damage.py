@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import zstandard
 from damadics_fd.bag import BagError, BagWriter, read_columns
-from damadics_fd.bag.inspection import LOSSY, UNUSABLE, WHOLE, inspect
+from damadics_fd.bag.checking.inspection import LOSSY, UNUSABLE, WHOLE, inspect
 from damadics_fd.bag.mcap.reader import McapFile
 from damadics_fd.bag.mcap.records import CHUNK, MAGIC, Op, record, string
 from damadics_fd.bag.mcap.writer import McapWriter

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 from damadics_fd.bag import BagError, BagWriter, iter_columns, write_columns
-from damadics_fd.bag.inspection import UNUSABLE, WHOLE, inspect
+from damadics_fd.bag.checking.inspection import UNUSABLE, WHOLE, inspect
 from damadics_fd.bag.mcap.records import HEAD, MAGIC
 from damadics_fd.bag.salvage import salvage
 

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
-from damadics_fd.bag.inspection import WHOLE, inspect
+from damadics_fd.bag.checking.inspection import WHOLE, inspect
 from damadics_fd.commands.replay.replay import main
 
 BAGS = Path(__file__).parents[5] / 'bags'

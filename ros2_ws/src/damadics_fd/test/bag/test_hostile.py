@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 import zstandard
 from damadics_fd.bag import BagError
-from damadics_fd.bag.inspection import LOSSY, UNUSABLE, WHOLE, inspect
+from damadics_fd.bag.checking.inspection import LOSSY, UNUSABLE, WHOLE, inspect
 from damadics_fd.bag.mcap.records import CHUNK, MAGIC, Op, record, string
 from damadics_fd.bag.mcap.writer import McapWriter
 from damadics_fd.bag.recording import Recording, find_recordings

@@ -7,12 +7,12 @@ import shutil
 import numpy as np
 import pytest
 from damadics_fd.bag import BagError, BagWriter, read_columns, write_columns
-from damadics_fd.bag.blackbox import BlackBox
-from damadics_fd.bag.inspection import WHOLE, inspect
+from damadics_fd.bag.checking.inspection import WHOLE, inspect
 from damadics_fd.bag.mcap.reader import McapFile
 from damadics_fd.bag.rosbag2 import qos
 from damadics_fd.bag.salvage import salvage
-from damadics_fd.bag.spool import Spool
+from damadics_fd.bag.writing.blackbox import BlackBox
+from damadics_fd.bag.writing.spool import Spool
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 

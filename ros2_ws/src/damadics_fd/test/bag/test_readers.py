@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from damadics_fd.bag import read_columns, write_columns
 from damadics_fd.bag.cdr.definition import schema_text
-from damadics_fd.bag.inspection import WHOLE, inspect
+from damadics_fd.bag.checking.inspection import WHOLE, inspect
 from damadics_fd.commands.replay.replay import main
 
 from .bag_support import MEASUREMENT, SIGNALS, needs_messages, stroke

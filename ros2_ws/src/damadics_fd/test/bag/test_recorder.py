@@ -13,7 +13,7 @@ import time
 import numpy as np
 import pytest
 from damadics_fd.bag import read_columns
-from damadics_fd.bag.inspection import LOSSY, WHOLE, inspect
+from damadics_fd.bag.checking.inspection import LOSSY, WHOLE, inspect
 
 from .bag_support import needs_messages
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from damadics_fd.bag import BagWriter, read_columns
 from damadics_fd.bag.cdr.definition import type_hash
+from damadics_fd.bag.checking.inspection import WHOLE, inspect
 from damadics_fd.bag.errors import BagError
-from damadics_fd.bag.inspection import WHOLE, inspect
-from damadics_fd.bag.spool import Spool
+from damadics_fd.bag.writing.spool import Spool
 
 try:
     type_hash('std_msgs/msg/Float64')

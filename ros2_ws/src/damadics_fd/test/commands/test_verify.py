@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 from damadics_fd.bag import BagWriter
-from damadics_fd.bag.timing import Timing
+from damadics_fd.bag.checking.timing import Timing
 from damadics_fd.commands.verify import main
 
 MILLISECOND = 1_000_000

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from damadics_fd.bag.bag_writer import NANO, BagWriter
 from damadics_fd.bag.columns import iter_columns
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.recording import Recording
 from damadics_fd.bag.rosbag2 import qos
+from damadics_fd.bag.writing.bag_writer import NANO, BagWriter
 from damadics_fd.core.result import Result
 
 NUMBER = 'damadics_msgs/msg/Float64Stamped'

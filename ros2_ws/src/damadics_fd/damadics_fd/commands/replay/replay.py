@@ -17,8 +17,8 @@ from typing import Any
 import yaml
 from tqdm import tqdm
 
+from damadics_fd.bag.checking.inspection import LOSSY
 from damadics_fd.bag.errors import BagError, NoMeasurementError, printable
-from damadics_fd.bag.inspection import LOSSY
 from damadics_fd.bag.mcap import loading
 from damadics_fd.bag.recording import Recording, find_recordings, parse_maps
 from damadics_fd.commands.options import add_settings, add_sources, settings_in

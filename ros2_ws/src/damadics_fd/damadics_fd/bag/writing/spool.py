@@ -6,10 +6,10 @@ import threading
 import time
 from collections import deque
 
-from damadics_fd.bag.bag_writer import BagWriter
-from damadics_fd.bag.blackbox import BlackBox
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.rosbag2 import Topic
+from damadics_fd.bag.writing.bag_writer import BagWriter
+from damadics_fd.bag.writing.blackbox import BlackBox
 
 Item = tuple[Topic, bytes, int, int]  # topic, serialised message, log and publish time [ns]
 

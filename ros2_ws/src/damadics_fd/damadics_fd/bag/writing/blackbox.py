@@ -8,12 +8,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from damadics_fd.bag.bag_writer import NANO, BagWriter
 from damadics_fd.bag.cdr.definition import parse_definition, schema_text
 from damadics_fd.bag.cdr.layout import layout_of
 from damadics_fd.bag.errors import BagError
-from damadics_fd.bag.latched import Kept, Latched
 from damadics_fd.bag.rosbag2 import QosProfile, Topic
+from damadics_fd.bag.writing.bag_writer import NANO, BagWriter
+from damadics_fd.bag.writing.latched import Kept, Latched
 
 FLAG = 'damadics_msgs/msg/FaultFlag'
 MOST_BYTES = 1 << 29  # held in memory, whatever the seconds

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damadics_fd.bag.cdr.decoder import Decoder
+from damadics_fd.bag.checking.timing import Timing
 from damadics_fd.bag.errors import BagError, printable
 from damadics_fd.bag.limits import Limits
 from damadics_fd.bag.messages import Batch, MessageFile
 from damadics_fd.bag.opening import open_file
 from damadics_fd.bag.rosbag2 import METADATA_FILE, read_metadata
 from damadics_fd.bag.sources import bag_files, missing_files
-from damadics_fd.bag.timing import Timing
 
 WHOLE, UNUSABLE, LOSSY = 0, 1, 3  # exit codes, as those of `mcap recover`
 SEVERAL = ('/tf', '/tf_static', '/diagnostics', '/rosout', '/parameter_events')

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from damadics_fd.bag.checking.inspection import Report
 from damadics_fd.bag.errors import BagError
-from damadics_fd.bag.inspection import Report
 from damadics_fd.bag.rosbag2 import Yaml, load_yaml
 
 MEASURES = {  # in a file of expectations: what it is, and whether a bare number is the most

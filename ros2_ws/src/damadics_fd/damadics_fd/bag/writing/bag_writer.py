@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from damadics_fd.bag.cdr.definition import schema_text, type_hash
 from damadics_fd.bag.cdr.layout import stamped_encoder
 from damadics_fd.bag.errors import BagError
-from damadics_fd.bag.latched import Kept, Latched
 from damadics_fd.bag.mcap.writer import CHUNK_SIZE, LEVEL, McapWriter
 from damadics_fd.bag.rosbag2 import (
     METADATA_FILE,
@@ -23,7 +22,8 @@ from damadics_fd.bag.rosbag2 import (
     Topic,
     qos_text,
 )
-from damadics_fd.bag.whole_writes import WholeWrites
+from damadics_fd.bag.writing.latched import Kept, Latched
+from damadics_fd.bag.writing.whole_writes import WholeWrites
 
 FLUSH_PERIOD = 0.5  # [s] a crash loses at most what came since the last flush
 NANO = 1_000_000_000

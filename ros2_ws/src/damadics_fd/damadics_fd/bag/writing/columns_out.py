@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from damadics_fd.bag.bag_writer import BagWriter
 from damadics_fd.bag.mapping import SIGNALS
 from damadics_fd.bag.rosbag2 import qos
+from damadics_fd.bag.writing.bag_writer import BagWriter
 
 
 def write_columns(
