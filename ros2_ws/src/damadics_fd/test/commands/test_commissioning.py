@@ -194,3 +194,26 @@ def test_constants_in_place_of_pressures_are_named(recording):
     reasons = ' '.join((*proposal.refusing, *proposal.limiting))
     assert 'p1 is the constant 3.5e+06 Pa' in reasons
     assert 'will be missed' in reasons
+
+
+def test_mode_scada_says_what_it_needs(tmp_path, capsys):
+    file = tmp_path / 'short.csv'
+    t = np.arange(600.0)
+    table = np.column_stack([t, 0.5 + 0.3 * np.sin(0.01 * t), 0.5 + 0.3 * np.sin(0.01 * t - 0.1)])
+    np.savetxt(file, table, delimiter=',', header='t,cv,x1', comments='')
+    assert main([str(file), '--mode', 'scada']) == 1
+    assert '600 s were recorded, 1800 s are needed' in capsys.readouterr().err.replace(
+        '599', '600'
+    )
+
+
+def test_options_that_do_not_fit_are_refused(tmp_path, capsys):
+    for words, reason in (
+        (['a.csv', '--mode', 'scada', '--twin', 'b.yaml'], 'mode monitor'),
+        (['a.csv', '--reference', 'r'], '--actuator'),
+        (['a.csv', '--until', '0'], '--until'),
+    ):
+        with pytest.raises(SystemExit) as stop:
+            main(words)
+        assert stop.value.code == 2
+        assert reason in capsys.readouterr().err

@@ -5,7 +5,9 @@
 import numpy as np
 import pytest
 from damadics_fd.commands.commission.balance import find_balance
+from damadics_fd.commands.commission.errors import CommissioningError
 from damadics_fd.commands.commission.signals import gather
+from damadics_fd.commands.commission.twin import twin
 from damadics_fd.core.identified import FaultFree
 from damadics_fd.core.monitor import run
 from damadics_fd.core.settings import Settings
@@ -107,3 +109,17 @@ def test_a_standing_fault_is_one_occurrence():
     loop = foreign.control(1800.0, 26)
     t = trial(build, proposal, 'friction +300 %', 26, quiet=300.0, after=1500.0, cv=loop)
     assert t.occurrences <= 1
+
+
+def test_a_twin_has_what_was_found(tmp_path):
+    build = foreign.random_valve(27)
+    proposal = commissioned(build, 27, minutes=10.0)
+    constants = twin(proposal)
+    assert constants['stiffness'] == pytest.approx(build.stiffness, rel=0.03)
+    assert constants['static'] >= constants['coulomb'] > 0.0
+    assert 0.0 < constants['lag'] < 1.0
+    other = commissioned(
+        foreign.random_valve(27, air_to='open', flow_to='close'), 27, minutes=10.0
+    )
+    with pytest.raises(CommissioningError, match='air to open'):
+        twin(other)

@@ -10,9 +10,11 @@ import numpy as np
 
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.recording import Recording, find_recordings, parse_maps
+from damadics_fd.commands.commission.control_room import identify as identify_scada
 from damadics_fd.commands.commission.errors import CommissioningError
 from damadics_fd.commands.commission.monitor import identify
 from damadics_fd.commands.commission.plot import draw
+from damadics_fd.commands.commission.twin import write_twin
 from damadics_fd.commands.commission.valve_file import parameter_file
 from damadics_fd.commands.options import add_settings, add_sources, settings_in
 from damadics_fd.core.identified import REFUSED, FaultFree, Identified
@@ -166,16 +168,11 @@ def _identify(
     recordings: list[FaultFree], sheet: Settings, given: set[str], options: argparse.Namespace
 ) -> Identified:
     if options.mode == 'scada':
-        from damadics_fd.core.scada.identify import identify as identify_scada
-
-        found: Identified = identify_scada(recordings, sheet, given)
-        return found
+        return identify_scada(recordings, sheet, given)
     proposal = identify(recordings, sheet, given, options.days)
     if options.plot:
         draw(proposal, options.plot)
     if options.twin:
-        from damadics_fd.commands.commission.twin import write_twin
-
         write_twin(proposal, options.twin, options.actuator)
     return proposal.identified(Settings.for_mode('monitor'))
 

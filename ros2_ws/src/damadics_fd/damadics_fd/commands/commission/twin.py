@@ -16,8 +16,10 @@ from damadics_fd.core.record import Floats
 from damadics_fd.core.settings import Settings
 
 ATMOSPHERE, GAS = 101325.0, 287.0 * 293.0  # Pa; R T of air [J/kg]
-FINE = 0.05  # s
-TOP = 95.0  # percentile of the flow that counts as full opening
+FINE, SHORT = 0.2, 0.05  # s
+TOP = 90.0  # percentile of the flow that counts as full opening
+TINY = 0.025  # s; means of the chamber pressure in which its answer to a step is sought
+ANSWER, DEAD = 0.25, 0.02  # time constants, and s, until the air answers
 LEAST_DRIVE = 3e4  # Pa
 BRISTLE = 2e-5  # m by which the stem gives before it breaks away
 STRIBECK = 1e-3  # m/s
@@ -70,7 +72,7 @@ def twin(proposal: Proposal) -> dict[str, float]:
         )
     signals = gather([FaultFree('all', {**proposal.columns})])
     fine = blocks(signals, FINE, s.ps_lag)
-    static = max(breakaway(proposal, fine), b.friction)
+    static = max(breakaway(proposal, blocks(signals, SHORT, s.ps_lag)), b.friction)
     fill, vent = capacities(fine, s)
     dry = max(b.friction, 1e-3 * s.stiffness * s.stroke)
     gain = b.gain if s.plug_diameter > 0.0 else 0.0
@@ -140,24 +142,31 @@ def response(signals: Signals) -> float:
     """
     Return the time constant of the positioner's set-point filter, from when the air answers.
 
-    The filter has two equal lags; the air answers when its output has gone 4 % of a step, after
-    0.3 time constants.
+    The filter has two equal lags; the air answers when its output has gone 2 % of a step, after
+    a quarter of a time constant. When it did is read from the pressure's rise, traced back.
 
     :param signals: the samples.
     :return: [s].
     """
-    jumps = np.flatnonzero(np.abs(np.diff(signals.cv)) > STEP)
-    still = round(1.0 * signals.rate)
-    waits = []
-    for i in jumps[:400]:
-        before = signals.ps[max(0, i - still) : i]
-        after = signals.ps[i + 1 : i + 1 + round(LOOK * signals.rate)]
-        if len(before) < still // 2 or len(after) < 10:
+    n = max(1, round(TINY * signals.rate))
+    rows = len(signals.ps) // n
+    ps = signals.ps[: rows * n].reshape(rows, n).mean(axis=1)
+    cv = signals.cv[: rows * n].reshape(rows, n)[:, -1]
+    width, waits = n / signals.rate, []
+    still, look = round(1.0 / width), round(LOOK / width)
+    for i in np.flatnonzero(np.abs(np.diff(cv)) > STEP)[:400]:
+        before, after = ps[max(0, i - still) : i], ps[i : i + look]
+        if len(before) < still or len(after) < look:
             continue
-        noise = float(np.std(np.diff(before)))
-        moved = np.flatnonzero(np.abs(after - before[-5:].mean()) > 6.0 * noise + 200.0)
-        if len(moved) and float(np.ptp(before)) < 12.0 * noise + 1e3:
-            waits.append(moved[0] / signals.rate)
+        noise = float(np.std(np.diff(before))) + 20.0
+        rise = np.abs(after - before.mean())
+        crossed = np.flatnonzero(rise > 8.0 * noise)
+        if not len(crossed) or float(np.ptp(before)) > 8.0 * noise or crossed[0] + 4 >= look:
+            continue
+        k = int(crossed[0])
+        slope = (rise[k + 4] - rise[k]) / (4.0 * width)
+        if slope > 0.0:
+            waits.append(max(k * width - rise[k] / slope, 0.0))
     if not waits:
         return 0.3
-    return float(min(max(np.median(waits) / 0.3, 0.02), 5.0))
+    return float(min(max((np.median(waits) - DEAD) / ANSWER, 0.02), 5.0))

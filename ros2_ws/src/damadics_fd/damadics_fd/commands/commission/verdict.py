@@ -17,6 +17,7 @@ CERTAIN = 4.0  # standard deviations
 SHEET = 0.05  # share by which a stated constant may be off without a word
 REFERENCE = 2.0  # inflation of the variance of the reference, as in the signature
 GOOD_FRICTION, GOOD_SPRING = 1.0, 0.2  # smallest changes found of a valve that is not limited
+FREE = 2e-3  # of the spring force: friction of a valve that hardly has any
 TRUSTED = 0.5  # of the friction: a larger misfit hides it
 
 
@@ -139,7 +140,11 @@ def hidden_friction(b: Balance) -> bool:
     """
     Tell whether the balance leaves more than half the friction unexplained.
 
+    What the noise of the sensors leaves is averaged out by the signature and does not count.
+
     :param b: the balance.
     :return: True where friction faults cannot be seen.
     """
-    return b.misfit > TRUSTED * max(b.total, 1e-9)
+    model = float(np.sqrt(max(b.misfit**2 - b.noise**2, 0.0)))
+    least = FREE * b.settings.stiffness * b.settings.stroke
+    return model > TRUSTED * max(b.total, least)
