@@ -190,7 +190,7 @@ def unlike(s: State) -> bool:
     if s.base[0] == 0.0:
         return False
     far = abs(s.theta[1]) > FAR or abs(s.theta[0]) > FAR
-    return far or s.sigma > max(LEFT_OVER * abs(s.theta[2]), LEAST_LEFT)
+    return bool(far or s.sigma > max(LEFT_OVER * abs(s.theta[2]), LEAST_LEFT))
 
 
 @jit

@@ -109,7 +109,7 @@ def swing(c: Any) -> float:
     :param c: settings record.
     :return: [Pa].
     """
-    return abs(c.force_scale / c.diaphragm_area)
+    return float(abs(c.force_scale / c.diaphragm_area))
 
 
 @jit
