@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from damadics_fd.bag import BagWriter, read_columns, write_columns
 from damadics_fd.bag.recording import Recording, find_recordings
-from damadics_fd.bag.tables import LUBLIN
+from damadics_fd.bag.tables.headers import LUBLIN
 from damadics_fd.commands.replay import output
 from damadics_fd.commands.replay.replay import main, unique_stems
 from damadics_fd.core.monitor import run
