@@ -7,7 +7,7 @@ from enum import IntEnum
 from typing import Annotated, NamedTuple
 
 from damadics_fd.core.jit import jit
-from damadics_fd.core.modes import MONITOR, PAPER
+from damadics_fd.core.modes import MONITOR
 from damadics_fd.core.record import Ints, Record
 from damadics_fd.core.settings import Settings
 
@@ -123,7 +123,7 @@ def signal_fault(c: Settings, index: int, value: float) -> int:
     :return: ACCEPTED, NOT_FINITE or OUT_OF_RANGE.
     """
     force = c.mode_code == MONITOR
-    drop = c.mode_code != PAPER
+    drop = force  # mode scada goes on without pressures
     if index <= 1:
         return value_fault(value, c.signal_low, c.signal_high, True)
     if index <= 3:

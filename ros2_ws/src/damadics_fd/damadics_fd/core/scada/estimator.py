@@ -20,8 +20,32 @@ from damadics_fd.core.scada.monitor import ScadaMonitor
 from damadics_fd.core.scada.settings import ScadaSettings
 from damadics_fd.core.scada.state import MONITOR, Reference
 from damadics_fd.core.settings import Settings
+from damadics_fd.core.valve.parameters import Valve
 
 BLANK = np.zeros(1, MONITOR)
+
+
+def scada_settings(settings: Settings, kv_stated: bool | None = None) -> ScadaSettings:
+    """
+    Return what the monitor of mode scada reads of all settings.
+
+    :param settings: of mode scada.
+    :param kv_stated: the valve coefficient is this valve's; None: where it is no default.
+    """
+    if kv_stated is None:
+        kv_stated = settings.kv != Valve().kv
+    return ScadaSettings(
+        period_s=1.0 / min(settings.sample_rate, 1.0),
+        t_on_s=settings.t_on,
+        learn_from_s=settings.t_w,
+        learn_s=settings.t_learn,
+        gap_s=settings.gap_reset,
+        settle_s=settings.hold,
+        days_per_false_alarm=settings.false_alarm_days,
+        sigma=settings.sensor_noise,
+        kv_stated=kv_stated,
+        actuator=settings.valve(),
+    )
 
 
 class ScadaEstimator(Intake):
@@ -35,19 +59,7 @@ class ScadaEstimator(Intake):
     """
 
     def __init__(self, settings: Settings) -> None:
-        self.monitor = ScadaMonitor(
-            ScadaSettings(
-                period_s=1.0 / min(settings.sample_rate, 1.0),
-                t_on_s=settings.t_on,
-                learn_from_s=settings.t_w,
-                learn_s=settings.t_learn,
-                gap_s=settings.gap_reset,
-                settle_s=settings.hold,
-                days_per_false_alarm=settings.false_alarm_days,
-                sigma=settings.sensor_noise,
-                actuator=settings.valve(),
-            )
-        )
+        self.monitor = ScadaMonitor(scada_settings(settings))
         super().__init__(settings)
         self.shown = Shown.rows()
         self._estimate = Estimate.rows()
@@ -193,14 +205,17 @@ class ScadaEstimator(Intake):
         phase = self.shown['phase'][0]
         if phase == PHASE_MONITOR:
             isolation = self.monitor.isolate()
-            return f'monitoring; alarm: {isolation.text()}' if isolation else 'monitoring'
+            if isolation:
+                return f'monitoring; alarm: {isolation.text()}'
+            off = self.monitor.missing()
+            return f'monitoring; no test of {", ".join(off)}' if off else 'monitoring'
         if phase == PHASE_HOLD:
             return 'on hold: the models settle'
         if phase == PHASE_INIT:
             return 'waiting for the first good sample'
         share = f'learning, {100.0 * self.monitor.progress:.0f} %'
         problem = self.monitor.learning_problem
-        return f'{share}: insufficient excitation, {problem}' if problem else share
+        return f'{share}: {problem}' if problem else share
 
     def learned(self) -> Saved:
         """

@@ -38,8 +38,14 @@ def resume(states: Array, k: int, blank: Array) -> None:
     """
     s = states[k]
     alarm, t_alarm, t_onset, test = s.alarm, s.t_alarm, s.t_onset, s.test
+    occurrence, stood, recovery = s.occurrence, s.stood, s.recovery
+    stands = s.stands.copy()
     states[k] = blank[0]
     s = states[k]
+    s.occurrence = occurrence
+    s.stood = stood
+    s.recovery = recovery
+    s.stands[:] = stands
     s.alarm = alarm
     s.t_alarm = t_alarm
     s.t_onset = t_onset

@@ -41,6 +41,7 @@ OFF = 1e9  # a limit that is never reached
 NEVER = 9.0  # a change of CV, which is 0..1, is never as large
 JUMPS = (0.05, 3.0)  # a jump of CV is more than this, and than this times the largest learned
 STATED_FLOW = (1.5, 0.1, 0.05)  # sigma, gain and offset with which the stated flow law is right
+PILED = 10  # samples at one highest value: the end of the meter's range
 SWING = (0.25, 2.0)  # of the pressure drop, of the largest change learned
 T, CV, X, PRESSURE_1, PRESSURE_2, TEMPERATURE, FLOW = range(7)
 
@@ -268,7 +269,7 @@ def _choose_flow(
     ref['flow_max'] = float(np.nanquantile(flow, 0.999))
     flow_range = settings.flow_range
     if flow_range is None:
-        flow_range = 1.0 if ref['flow_max'] <= 1.0 else 0.0
+        flow_range = _end_of_range(flow)
     stated = prediction is not None and _stated_flow(ref, prediction, flow)
     if prediction is None:
         return
@@ -291,6 +292,19 @@ def _choose_flow(
         _tell(fit, notes)
     ref['flow_law']['range'] = flow_range
     check_flow(ref, settings)
+
+
+def _end_of_range(flow: Floats) -> float:
+    """
+    Return the end of the flow meter's range, scaled; 0 where the record does not show it.
+
+    A meter at its end shows one value again and again. One that never was there, and no more than
+    the benchmark's 40 t/h, is taken to reach to these.
+    """
+    top = float(np.nanmax(flow))
+    if np.count_nonzero(flow >= top * (1.0 - 1e-9)) >= PILED:
+        return top
+    return 1.0 if top <= 1.0 else 0.0
 
 
 def _tell(fit: FlowFit, notes: list[str] | None) -> None:

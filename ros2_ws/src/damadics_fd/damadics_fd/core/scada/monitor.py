@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from damadics_fd.core.jit import jit
 from damadics_fd.core.scada.actuator import F_RANGE, P_RANGE, T_RANGE, TPH_PER_KGS
-from damadics_fd.core.scada.cusum import TEST_NAMES
+from damadics_fd.core.scada.cusum import R2, TEST_NAMES, TESTS
 from damadics_fd.core.scada.isolation import Isolation, Isolator
 from damadics_fd.core.scada.learning import LearningError, learn
 from damadics_fd.core.scada.predict import predict
@@ -33,6 +33,8 @@ TRACE = np.dtype(
 )
 FARTHEST = 5.0  # times 4 MPa: no control valve works above
 OUTSIDE = 0.25  # share of full scale a measurement may lie outside its range
+KEPT = ('alarm', 't_alarm', 't_onset', 'test', 'occurrence', 'stood', 'recovery', 'stands')
+FLOW_TEST = [test.residual for test in TESTS].index(R2) + 1
 LEARN_AGAIN_S = 60.0
 
 
@@ -63,7 +65,7 @@ def scada_samples(columns: Mapping[str, NDArray]) -> Floats:
     """
     Return the columns of a recording as rows t, CV, X', P1', P2', T1', F', scaled to 0..1.
 
-    :param columns: `stamp` (ns) and cv, x1, p1, p2 (Pa); t1 (degC), flow (kg/s) where measured.
+    :param columns: `stamp` (ns) and cv, x1; p1, p2 (Pa), t1 (degC), flow (kg/s) where measured.
     :return: array of shape (n, 7); NaN where not measured.
     """
     n = len(columns['stamp'])
@@ -73,8 +75,8 @@ def scada_samples(columns: Mapping[str, NDArray]) -> Floats:
             columns['stamp'] / 1e9,
             columns['cv'],
             columns['x1'],
-            columns['p1'] / P_RANGE,
-            columns['p2'] / P_RANGE,
+            columns.get('p1', missing) / P_RANGE,
+            columns.get('p2', missing) / P_RANGE,
             columns.get('t1', missing) / T_RANGE,
             columns.get('flow', missing) * (TPH_PER_KGS / F_RANGE),
         ]
@@ -187,6 +189,7 @@ class ScadaMonitor:
         self.reference = self._given
         self.learning_problem = ''
         self.notes: list[str] = []
+        self._isolated: tuple[tuple[int, int], Isolation | None] | None = None
         self._state = np.zeros(1, MONITOR)
         self._buffer = np.empty((0, 7))
         self._filled = 0
@@ -204,7 +207,7 @@ class ScadaMonitor:
             self.reset()
             return
         before, self._state = self._state, np.zeros(1, MONITOR)
-        for name in ('alarm', 't_alarm', 't_onset', 'test'):
+        for name in KEPT:
             self._state[name] = before[name]
 
     @property
@@ -318,10 +321,31 @@ class ScadaMonitor:
         return np.concatenate((learned, trace[:count])) if len(learned) else trace[:count]
 
     def isolate(self) -> Isolation | None:
-        """Rank the faults that explain the record since the onset; None without an alarm."""
-        if self.reference is None:
+        """
+        Rank the faults that explain the record since the onset; None without an alarm.
+
+        The ranking is kept until there is more evidence, or a sixteenth more samples.
+        """
+        if self.reference is None or not self.state.alarm:
             return None
-        return Isolator(self._record[0], self.reference[0]).isolate(self.state)
+        since = self.state.t_evidence - self.state.t_onset
+        key = (int(self.state.occurrence), int(16.0 * math.log2(max(since, 1.0))))
+        if self._isolated is None or self._isolated[0] != key:
+            isolator = Isolator(self._record[0], self.reference[0])
+            self._isolated = (key, isolator.isolate(self.state))
+        return self._isolated[1]
+
+    def missing(self) -> list[str]:
+        """Return the tests that cannot be made, each with the reason."""
+        if self.reference is None:
+            return []
+        ref = self.reference[0]
+        off = []
+        if not ref['sd'][FLOW_TEST] > 0.0:
+            off.append('the flow (P1, P2, T1 or F is not measured, or too few samples)')
+        if not ref['drop'] > 0.0:
+            off.append('the pressures (not measured)')
+        return off
 
     def _learn_from(self, samples: Floats, start: int, learned: NDArray) -> tuple[int, NDArray]:
         room = self._filled + len(samples) - start

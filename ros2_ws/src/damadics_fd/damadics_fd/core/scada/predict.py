@@ -6,6 +6,7 @@ import math
 
 from damadics_fd.core.jit import jit
 from damadics_fd.core.scada.actuator import nominal_flow
+from damadics_fd.core.scada.decide import silence
 from damadics_fd.core.scada.flow_law import characteristic, sizing
 from damadics_fd.core.scada.model import advance_stem, copy_stem, start_stem
 from damadics_fd.core.scada.pressure import (
@@ -20,6 +21,7 @@ from damadics_fd.core.scada.settings import ScadaConfig
 from damadics_fd.core.scada.state import HISTORY_LENGTH, LAW, MonitorState, Reference
 from damadics_fd.core.scada.stem_law import advance_track, position, start_track
 
+FORGET_S = 300.0
 SETTLING_PERIODS = 10.0
 COPIES = 2  # rows in a row that may be copies
 GAP_PERIODS = 5.0  # sample periods without a sample that are no gap yet
@@ -148,7 +150,15 @@ def predict(
         s.t_test = t + cfg.t_on_s
         restart(s, cfg, ref, t, cv, x, p1, p2)
     elif t - s.t > max(cfg.gap_s, GAP_PERIODS * ref.period):
-        s.t_test = max(s.t_test, t + settling(cfg, ref))
+        if ref.stem_kind == LAW:  # it starts at the measured position: only r1 has to wait
+            s.t_stem = max(s.t_stem, t + settling(cfg, ref))
+            silence(s)
+        else:
+            s.t_test = max(s.t_test, t + settling(cfg, ref))
+        if t - s.t > FORGET_S:  # what stood then is not known now: new evidence decides
+            s.stands[:] = 0
+            s.stood = False
+            s.t_gone = t
         restart(s, cfg, ref, t, cv, x, p1, p2)
     entry = s.history[s.samples % HISTORY_LENGTH]
     t0 = s.t if s.filled > 0 else t

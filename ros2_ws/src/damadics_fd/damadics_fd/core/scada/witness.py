@@ -58,8 +58,10 @@ def by_witnesses(state: Any, ref: Any, window: NDArray) -> Isolation:
         _flow(score, state, ref, window)
     elif early(R1):
         _stem(score, state, ref, window)
-        if flow and early(R2):
-            score[13] += GOOD
+        if flow and early(R2) and state['sign'][R1] == state['sign'][R2]:
+            score[13] += (
+                CLEAR  # X' reads too far closed and the flow is too high for it, or both not
+            )
         elif not math.isnan(float(ref['f_mean'])) and ref['flow_max'] > 0.0:
             score[13] -= FAIR  # the flow would not follow a position that only the sensor shows
     ranking = sorted(
@@ -88,7 +90,7 @@ def _flow(score: dict[int, float], state: Any, ref: Any, window: NDArray) -> Non
     score[19] += FAIR
     for fault in (2, 5) if up else (3, 6, 18):
         score[fault] -= CLEAR
-    score[13] -= FAIR
+    score[13] += FAIR * 0.5  # a positioner follows its sensor at once: the stem shows little
     abrupt = float(state['t_raised'] - state['t_onset']) < 60.0
     if abrupt:
         for fault in (2, 3, 5, 6):
@@ -99,7 +101,7 @@ def _flow(score: dict[int, float], state: Any, ref: Any, window: NDArray) -> Non
         score[18] += GOOD
         score[19] -= FAIR * 0.5
     elif up and abs(change) < 0.5 * MOVED_DROP:
-        score[19] += GOOD
+        score[19] += FAIR * 0.5
 
 
 def _few(window: NDArray) -> int:
@@ -133,8 +135,8 @@ def _stem(score: dict[int, float], state: Any, ref: Any, window: NDArray) -> Non
     asked, done = spread_of(xm), spread_of(x)
     sigma = float(ref['stem_law']['gain'] and ref['sd'][0])
     if asked > 3.0 * sigma and done < STILL * asked:
-        score[4] += GOOD
-        score[1] += GOOD if opening else 0.0
+        score[4] += CLEAR
+        score[1] += CLEAR if opening else 0.0
         score[15] += FAIR
     toward = float(x[-1] - x[0])
     command = float(xm[-1] - xm[0])
