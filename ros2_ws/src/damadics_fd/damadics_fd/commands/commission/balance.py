@@ -97,13 +97,16 @@ class Fit:
     left: Floats
 
 
-def find_balance(signals: Signals, sheet: Settings, given: Collection[str] = ()) -> Balance:
+def find_balance(
+    signals: Signals, sheet: Settings, given: Collection[str] = (), pressures: bool = True
+) -> Balance:
     """
     Identify directions, lag, plug force, spring and friction.
 
     :param signals: good samples of a fault-free valve.
     :param sheet: settings with what the data sheet says.
     :param given: names of the settings that the user stated.
+    :param pressures: P1 and P2 are measured; constants in their place would pass for a lag.
     :return: the balance.
     :raises CommissioningError: where the stem moves too little, or the fit is no valve.
     """
@@ -111,7 +114,11 @@ def find_balance(signals: Signals, sheet: Settings, given: Collection[str] = ())
     viscous = sheet.alpha1 * sheet.mass if 'alpha1' in given else None
     lag = find_lag(fine, sheet, viscous)
     s, undetermined = _directed(sheet, lag, given)
+    if not pressures:
+        lag = replace(lag, seconds=0.0)
     balance = _with_lag(signals, s, lag, sheet, given, undetermined)
+    if not pressures:
+        return balance
     again = find_lag(fine, balance.settings, viscous)  # a better plug force tells the lag better
     if abs(again.seconds - lag.seconds) >= SAME_LAG:
         lag = again

@@ -104,9 +104,10 @@ def identify(
             'tell causes apart: take --mode scada'
         )
     base = sheet.replace(sample_rate=signals.rate, **ranges(recordings, sheet))
-    balance = find_balance(signals, base, given)
+    dead = dead_signals(recordings)
+    balance = find_balance(signals, base, given, pressures=not dead)
     _same_valve(recordings, base, given)
-    return _propose(recordings, base, given, days, balance, dead_signals(recordings))
+    return _propose(recordings, base, given, days, balance, dead)
 
 
 def _propose(

@@ -64,7 +64,9 @@ def physical_value(s: Any, c: Any, m: int, h: int) -> tuple[float, float]:
         variance += late * late
         if variance > (UNKNOWN * F_unit) ** 2:
             return math.nan, math.nan
-        told = abs(s.apart[m]) > APART * s.apart_sd[m] and m == SET_SLOW
+        # the dry part leads where its share is the larger one
+        beyond = s.apart[m] if value >= 0.0 else -s.apart[m]
+        told = beyond > APART * s.apart_sd[m] and m == SET_SLOW
         F_dry = max(s.unit[SIGN], SMALL_FRICTION)
         leads = abs(s.dry[m]) * F_dry > 0.5 * abs(value) * F_unit
         if told and leads and cov[SIGN, SIGN] < (UNKNOWN * F_dry) ** 2:
