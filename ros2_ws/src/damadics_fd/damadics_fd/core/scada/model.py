@@ -1,7 +1,7 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
 """
-Reduced stem model driven by 1 Hz samples: massless stem, Euler sub-steps of 2.5 ms.
+Reduced stem model driven by 1 Hz samples: massless stem, Euler sub-steps of 5 ms.
 
 Chamber pressure and air mass are two states, integrated separately as in DABLib: p V / (m_a R T)
 is not conserved through the play there, and a model with one state would drift away from it.
@@ -23,7 +23,7 @@ from damadics_fd.core.valve.pneumatics import (
     transducer,
 )
 
-SUB_STEPS = 14  # of 2.5 ms; a day's drift against the plant is then 1e-4 of stroke
+SUB_STEPS = 7  # of 5 ms; a day's drift against the plant is then 1e-4 of stroke
 COARSE_SUB_STEPS = 7  # enough for minutes
 GAS = GAS_CONSTANT * AIR_TEMPERATURE
 MINIMUM_SUPPLY = 1.2e5
