@@ -41,8 +41,22 @@ def pipeline() -> None:
     run({'stamp': np.array([1]), **columns}, Settings.for_mode('paper'))
 
 
+def bank(mode: str) -> None:
+    """Compile the loop over rows of many valves, which is made of the same steps."""
+    from damadics_fd.core.bank import Bank
+    from damadics_fd.core.settings import Settings
+
+    row = {name: np.array([value]) for name, value in SAMPLE.items()}
+    Bank([Settings.for_mode(mode)]).take(np.array([0]), np.array([1]), row)
+
+
 if __name__ == '__main__':
     with ProcessPoolExecutor(2, mp_context=get_context('spawn')) as pool:
         for done in [pool.submit(detector), pool.submit(the_others)]:
             done.result()
-    pipeline()
+        for done in [
+            pool.submit(pipeline),
+            pool.submit(bank, 'paper'),
+            pool.submit(bank, 'scada'),
+        ]:
+            done.result()

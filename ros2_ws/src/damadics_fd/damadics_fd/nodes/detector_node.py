@@ -3,12 +3,12 @@
 """Node `detector`: residual against threshold, fault flag and events of one actuator."""
 
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from damadics_msgs.msg import Estimate as EstimateMessage
 from damadics_msgs.msg import FaultEvent, FaultFlag, Float64Stamped
-from std_msgs.msg import Header
+from rclpy.serialization import deserialize_message
 
 from damadics_fd.causes import explain
 from damadics_fd.core.approximator.state import Estimate
@@ -18,14 +18,16 @@ from damadics_fd.core.modes import PHASE_INIT, PHASE_MONITOR
 from damadics_fd.core.text import SENTENCE, plain
 from damadics_fd.nodes.alarm_memory import AlarmMemory
 from damadics_fd.nodes.detector_report import report_of
+from damadics_fd.nodes.joint import Joints, Taker
 from damadics_fd.nodes.managed import MonitoringNode
 from damadics_fd.nodes.operator import OperatorActions, OperatorServices
 from damadics_fd.nodes.second_publisher import RivalWatch
 from damadics_fd.nodes.signature_publisher import SignaturePublisher, read_causes
 from damadics_fd.ros import qos
 from damadics_fd.ros.arguments import check_node_arguments
-from damadics_fd.ros.conversions import event_message, read_estimate, write_flag
+from damadics_fd.ros.conversions import event_message, read_estimate, set_stamp, write_flag
 from damadics_fd.ros.diagnostics import Level, Report
+from damadics_fd.ros.raw import stamp_of
 from damadics_fd.ros.spin import spin
 from damadics_fd.store.alarms import default_folder
 
@@ -40,9 +42,15 @@ READY = Estimate(*Estimate.rows().item())  # an estimate that makes the core com
 
 
 class DetectorNode(MonitoringNode):
-    """Judge each estimate; publish residual, threshold and what changes; serve operators."""
+    """
+    Judge each estimate; publish residual, threshold and what changes; serve operators.
 
-    def __init__(self, arguments: list[str] | None = None) -> None:
+    :param arguments: ROS arguments of this node alone; those of the process by default.
+    :param joints: with the estimators of the same process.
+    """
+
+    def __init__(self, arguments: list[str] | None = None, joints: Joints | None = None) -> None:
+        self._joints = joints or Joints()
         super().__init__('detector', 'estimate', START_ESTIMATOR, arguments)
         self._alarms = self._folder_of(self._alarm_folder)
         self._kept = self._folder_of(self._signature_folder, self._valve())
@@ -106,8 +114,22 @@ class DetectorNode(MonitoringNode):
         OperatorServices(made, actions, self._core, self._operated)
         made.timer(min(self.watch.timeout / 5.0, HEARTBEAT), self._look)
         made.timer(HEARTBEAT, self._beat)
-        self.watch.subscribe(EstimateMessage, self._take, qos.SAMPLES)
+        self._join(self.watch.subscribe(EstimateMessage, self._read, self._take, qos.SAMPLES))
         self._publish_flag()
+
+    def _join(self, heard: Callable[[Estimate, str], None]) -> None:
+        """Take estimates of an estimator in this process directly; errors as from a topic."""
+        contained = self.entities.contained('estimate', lambda found: heard(*found))
+        self._taker = Taker(lambda estimate, tag: contained((estimate, tag)))
+        takers = self._joints.at(self.resolve_topic_name('estimate')).takers
+        takers.append(self._taker)
+        self.entities.on_release(lambda: takers.remove(self._taker))
+
+    def _read(self, data: bytes) -> tuple[Estimate, str] | None:
+        if self._taker.is_echo(stamp_of(data)):
+            return None
+        message = deserialize_message(data, EstimateMessage)
+        return read_estimate(message), message.header.frame_id
 
     def _folder_of(self, given: str, own: str = '') -> Path | None:
         """Return the folder that a parameter means; `own` is the part of this valve in `auto`."""
@@ -118,17 +140,16 @@ class DetectorNode(MonitoringNode):
     def _valve(self) -> str:
         return self.get_namespace().strip('/').replace('/', '__') or 'root'
 
-    def _take(self, message: EstimateMessage) -> None:
-        decision = self._judge(message)
+    def _take(self, estimate: Estimate, tag: str) -> None:
+        decision = self._judge(estimate)
         if decision is not None:
-            self._publish(decision, message.header)
-            self._keep(decision, message.header)
+            self._publish(decision, tag)
+            self._keep(decision, tag)
 
-    def _judge(self, message: EstimateMessage) -> Decision | None:
+    def _judge(self, estimate: Estimate) -> Decision | None:
         """Judge an estimate; None where it is not to be judged."""
         if not self.active:
             return None
-        estimate = read_estimate(message)
         self._memory.begin(estimate.stamp)
         self._signature.begin(estimate.stamp)
         before = self._decision
@@ -142,24 +163,29 @@ class DetectorNode(MonitoringNode):
         self._judged += 1
         return self._core.update(estimate)
 
-    def _publish(self, decision: Decision, header: Header) -> None:
-        """Publish residual and threshold, and the flag where it has changed."""
+    def _publish(self, decision: Decision, tag: str) -> None:
+        """Publish residual and threshold to who listens, and the flag where it has changed."""
         before, self._decision = self._decision, decision
-        self._number.header = self._flag.header = header
-        self._number.data = decision.residual
-        self._residual.publish(self._number)
-        self._number.data = decision.threshold
-        self._threshold.publish(self._number)
+        number, header = self._number, self._number.header
+        set_stamp(header.stamp, decision.stamp)
+        if header.frame_id != tag:
+            header.frame_id = self._flag.header.frame_id = tag
+        if self._residual.get_subscription_count():
+            number.data = decision.residual
+            self._residual.publish(number)
+        if self._threshold.get_subscription_count():
+            number.data = decision.threshold
+            self._threshold.publish(number)
         turned = self._was_silent and self._look()
         if not turned and (before is None or decision.shown != before.shown):
             self._publish_flag()
             self.diagnostics.check()
 
-    def _keep(self, decision: Decision, header: Header) -> None:
+    def _keep(self, decision: Decision, tag: str) -> None:
         """Tell transitions, and keep alarm and signature for a restart."""
         if decision.events:
-            self._tell(decision.events, header.frame_id)
-        self._signature.update(header, decision.stamp)
+            self._tell(decision.events, tag)
+        self._signature.update(self._number.header, decision.stamp)
 
     def _tell(self, events: Iterable[Event], frame_id: str, more: str = '') -> None:
         for event in events:

@@ -11,6 +11,7 @@ from damadics_msgs.msg import Estimate as EstimateMessage
 from damadics_msgs.msg import Measurement, OperatorAction
 from damadics_msgs.srv import Relearn
 
+from damadics_fd.core.approximator.state import Estimate
 from damadics_fd.core.decision.alarm import (
     FAILURE,
     FUNCTION_CHECK,
@@ -20,14 +21,17 @@ from damadics_fd.core.decision.alarm import (
 )
 from damadics_fd.core.estimating import estimator_for
 from damadics_fd.core.quality import Reason, Refused
+from damadics_fd.core.sample import Sample
 from damadics_fd.nodes.frozen_position import FrozenPosition
+from damadics_fd.nodes.joint import Joints
 from damadics_fd.nodes.managed import MonitoringNode
 from damadics_fd.nodes.operator import OperatorActions
 from damadics_fd.nodes.reference_keeper import ReferenceKeeper
 from damadics_fd.ros import qos
 from damadics_fd.ros.arguments import check_node_arguments
-from damadics_fd.ros.conversions import sample, write_estimate
+from damadics_fd.ros.conversions import write_estimate
 from damadics_fd.ros.diagnostics import Level, Report
+from damadics_fd.ros.raw import any_sample
 from damadics_fd.ros.spin import spin
 
 DESCRIPTION = 'Estimate velocity and residual of one valve with the on-line approximator.'
@@ -41,9 +45,15 @@ RECENT = 1.5  # s of wall time for which a refused sample is told
 
 
 class EstimatorNode(MonitoringNode):
-    """Turn each measurement into an estimate; report what was refused; keep what was learned."""
+    """
+    Turn each measurement into an estimate; report what was refused; keep what was learned.
 
-    def __init__(self, arguments: list[str] | None = None) -> None:
+    :param arguments: ROS arguments of this node alone; those of the process by default.
+    :param joints: with the detectors of the same process.
+    """
+
+    def __init__(self, arguments: list[str] | None = None, joints: Joints | None = None) -> None:
+        self._joints = joints or Joints()
         super().__init__('estimator', 'measurement', START_PLANT, arguments)
         self.check_folders(reference=self._path.parent if self._path else None)
         estimator_for(self.settings).update(*READY)
@@ -66,6 +76,8 @@ class EstimatorNode(MonitoringNode):
         made = self.entities
         self._core.reset()
         self._message = EstimateMessage()
+        self._joint = self._joints.at(self.resolve_topic_name('estimate'))
+        self._progress = 0.0
         self._last = self._core.phase
         self._refused_at = -math.inf  # monotonic time of the last refused sample [s]
         self._frozen = FrozenPosition()
@@ -76,20 +88,19 @@ class EstimatorNode(MonitoringNode):
             self, made, self._actions, self._core, self.actuator, self.settings, self._path
         )
         self._reference.restore()
-        self.watch.subscribe(Measurement, self._take, qos.SAMPLES)
+        self.watch.subscribe(Measurement, any_sample, self._take, qos.SAMPLES)
 
-    def _take(self, measurement: Measurement) -> None:
+    def _take(self, sample: Sample, tag: str) -> None:
         if not self.active:
             return
-        self._frozen.note(measurement.header.stamp, measurement.cv, measurement.x1)
-        estimate = self._core.update(*sample(measurement))
+        self._frozen.note(sample.stamp, sample.cv, sample.x1)
+        estimate = self._core.update(*sample)
         if isinstance(estimate, Refused):
             self._refused_at = time.monotonic()
             self.diagnostics.check()
             return
-        write_estimate(estimate, self._message)
-        self._message.header.frame_id = measurement.header.frame_id
-        self._publisher.publish(self._message)
+        self._progress = estimate.progress
+        self._give(estimate, tag)
         phase = self._core.phase
         if phase != self._last:
             learned = phase == 'monitor' and self._last.startswith('learn')
@@ -97,6 +108,17 @@ class EstimatorNode(MonitoringNode):
             self.diagnostics.check()
             if learned:
                 self._reference.keep()
+
+    def _give(self, estimate: Estimate, tag: str) -> None:
+        """Hand an estimate to the detector beside, and publish it for whoever else listens."""
+        takers = self._joint.takers
+        if not takers or self._publisher.get_subscription_count() > len(takers):
+            write_estimate(estimate, self._message)
+            self._message.header.frame_id = tag
+            for taker in takers:
+                taker.sent(estimate.stamp)
+            self._publisher.publish(self._message)
+        self._joint.hand(estimate, tag)
 
     def _relearn(self, request: Relearn.Request, response: Relearn.Response) -> Relearn.Response:
         if self.settings.mode == 'paper':
@@ -123,7 +145,7 @@ class EstimatorNode(MonitoringNode):
         values = {
             'NE 107': self._class_of(failing, good),
             'Phase': self._core.phase,
-            'Learning progress (%)': 100.0 * self._message.progress,
+            'Learning progress (%)': 100.0 * self._progress,
             'Last refused': self._core.last_rejection or 'none',
             **{f'Samples {name.replace("_", " ")}': count for name, count in counters.items()},
         }

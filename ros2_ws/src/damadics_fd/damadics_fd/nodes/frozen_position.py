@@ -4,7 +4,7 @@
 
 import math
 
-from builtin_interfaces.msg import Time
+from damadics_fd.core.stamps import SECOND
 
 LONG = 3.0  # s
 MOVED = 0.15  # of the range of the control value
@@ -20,15 +20,15 @@ class FrozenPosition:
         self._low = self._high = math.nan
         self._now = 0.0
 
-    def note(self, stamp: Time, cv: float, x1: float) -> None:
+    def note(self, stamp: int, cv: float, x1: float) -> None:
         """
         Take a measurement.
 
-        :param stamp: of it.
+        :param stamp: of it [ns].
         :param cv: control value [1].
         :param x1: stem position [1].
         """
-        now = stamp.sec + 1e-9 * stamp.nanosec
+        now = stamp / SECOND
         if abs(x1 - self._place) <= STILL and now >= self._since:
             self._now = now
             if cv < self._low:

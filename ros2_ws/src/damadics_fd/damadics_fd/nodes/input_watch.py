@@ -11,10 +11,8 @@ from rclpy.event_handler import QoSRequestedIncompatibleQoSInfo as Incompatible
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import QoSPolicyKind, QoSProfile
-from std_msgs.msg import Header
 
 from damadics_fd.core.freshness import ForwardJumps, Freshness
-from damadics_fd.core.stamps import SECOND
 from damadics_fd.core.text import NAME, plain
 from damadics_fd.ros.entities import Entities
 
@@ -25,12 +23,14 @@ PERIODS = 3.0  # slower samples than the timeout allows for may be late by so ma
 
 
 class Stamped(Protocol):
-    """A message with a header."""
+    """What a message carries, with the stamp of its header."""
 
-    header: Header
+    @property
+    def stamp(self) -> int:
+        """Instant of the measurement [ns]."""
 
 
-M = TypeVar('M', bound=Stamped)
+S = TypeVar('S', bound=Stamped)
 
 
 class InputWatch:
@@ -76,34 +76,46 @@ class InputWatch:
         self._mismatch = ''
         self._timer = entities.timer(FIRST_WORD, self._remind)
 
-    def subscribe(self, kind: type[M], take: Callable[[M], None], profile: QoSProfile) -> None:
+    def subscribe(
+        self,
+        kind: type,
+        read: Callable[[bytes], tuple[S, str] | None],
+        take: Callable[[S, str], None],
+        profile: QoSProfile,
+    ) -> Callable[[S, str], None]:
         """
         Subscribe to the input.
 
         :param kind: type of its messages, which have a header.
-        :param take: called with each message; not with one whose stamp alone runs far ahead.
+        :param read: returns what a serialised message carries and its tag; None: ignore it.
+        :param take: called with each; not with one whose stamp alone runs far ahead.
         :param profile: quality of service; no deadline, for a publisher that offers none would
             then not be heard at all.
+        :return: takes what comes another way, as if it had come as a message.
         """
-        jumps: ForwardJumps[M] = ForwardJumps()
+        jumps: ForwardJumps[S] = ForwardJumps()
         self._far = lambda: jumps.refused
 
-        def arrived(message: M) -> None:
+        def heard(item: S, tag: str) -> None:
             self._wall = now = time.monotonic()
             if self._simulated:
                 self._ros = self._clock.now().nanoseconds
-            time_of = message.header.stamp
-            if message.header.frame_id != self._tag:
-                self._tag = message.header.frame_id = plain(message.header.frame_id, NAME)
-            for admitted in jumps.admit(time_of.sec * SECOND + time_of.nanosec, message, now):
-                stamp = admitted.header.stamp
-                self._fresh.heard(stamp.sec * SECOND + stamp.nanosec, now)
-                take(admitted)
+            if tag != self._tag:
+                self._tag = plain(tag, NAME)
+            for admitted in jumps.admit(item.stamp, item, now):
+                self._fresh.heard(admitted.stamp, now)
+                take(admitted, self._tag)
+
+        def arrived(data: bytes) -> None:
+            found = read(bytes(data))
+            if found:
+                heard(*found)
 
         events = SubscriptionEventCallbacks(
             incompatible_qos=self._incompatible, message_lost=self._count_lost
         )
-        self._entities.subscription(kind, self._topic, arrived, profile, events)
+        self._entities.subscription(kind, self._topic, arrived, profile, events, raw=True)
+        return heard
 
     @property
     def age(self) -> float:

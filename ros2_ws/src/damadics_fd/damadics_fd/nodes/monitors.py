@@ -8,11 +8,12 @@ from functools import partial
 
 from damadics_fd.nodes.detector_node import DetectorNode
 from damadics_fd.nodes.estimator_node import EstimatorNode
+from damadics_fd.nodes.joint import Joints
 from damadics_fd.ros.arguments import command_parser
 from damadics_fd.ros.parameter_files import missing_file
 from damadics_fd.ros.spin import SpinnableNode, spin_all
 
-NODES: dict[str, Callable[[list[str]], SpinnableNode]] = {
+NODES: dict[str, Callable[[list[str], Joints], SpinnableNode]] = {
     'estimator': EstimatorNode,
     'detector': DetectorNode,
 }
@@ -75,7 +76,8 @@ def main(args: list[str] | None = None) -> int:
     if problem:
         p.error(problem)
     # The process takes its enclave and log level from all words, the nodes theirs from their own.
-    return spin_all([partial(NODES[name], own) for name, *own in groups], words)
+    joints = Joints()
+    return spin_all([partial(NODES[name], own, joints) for name, *own in groups], words)
 
 
 if __name__ == '__main__':

@@ -84,21 +84,40 @@ class Entities:
         :param events: of the middleware.
         :param raw: `take` gets the serialised message.
         """
+        taken = self.contained(topic, take)
+        made = self._node.create_subscription(
+            kind, topic, taken, profile, event_callbacks=events, raw=raw
+        )
+        self._undo.append(lambda: self._node.destroy_subscription(made))
+
+    def contained(self, name: str, take: Callable[[M], None]) -> Callable[[M], None]:
+        """
+        Contain the errors of a callback, as those of a subscription.
+
+        :param name: by which `fails` tells of them.
+        :param take: the callback.
+        :return: what may be called in its place at any time.
+        """
 
         def taken(message: M) -> None:
             if self._alive:
                 try:
                     take(message)
                 except Exception as error:
-                    self._failed(topic, error)
+                    self._failed(name, error)
                 else:
                     if self._failing:
-                        self._failing.pop(topic, None)
+                        self._failing.pop(name, None)
 
-        made = self._node.create_subscription(
-            kind, topic, taken, profile, event_callbacks=events, raw=raw
-        )
-        self._undo.append(lambda: self._node.destroy_subscription(made))
+        return taken
+
+    def on_release(self, undo: Callable[[], object]) -> None:
+        """
+        Have something undone when the entities are released.
+
+        :param undo: called once.
+        """
+        self._undo.append(undo)
 
     def service(
         self, kind: type, name: str, serve: Callable[[Request, Response], Response]

@@ -14,8 +14,8 @@ from damadics_fd.core.stamps import DATE, SECOND
 pytest.importorskip('damadics_msgs.msg')
 from damadics_fd.nodes.fleet import blocks, status
 from damadics_fd.nodes.fleet.ages import Ages
-from damadics_fd.nodes.fleet.exposed import sample_of
 from damadics_fd.nodes.fleet.members import Member, Members, members_of
+from damadics_fd.ros.raw import sample_of
 from damadics_fd.store.fleet_file import FleetError, Valve
 from damadics_msgs.msg import FaultFlag, Measurement, MeasurementBlock
 from damadics_plant import simulate

@@ -22,7 +22,7 @@ from damadics_fd.core.sample import SIGNALS, Sample
 from damadics_fd.core.text import NAME, SENTENCE, plain
 from damadics_fd.nodes.fleet import blocks, status
 from damadics_fd.nodes.fleet.ages import Ages
-from damadics_fd.nodes.fleet.exposed import Exposed, expose, sample_of
+from damadics_fd.nodes.fleet.exposed import Exposed, expose
 from damadics_fd.nodes.fleet.keeping import Keeping
 from damadics_fd.nodes.fleet.members import Happening, Members, members_of
 from damadics_fd.nodes.fleet.services import FleetServices
@@ -34,6 +34,7 @@ from damadics_fd.ros.conversions import event_message, write_flag
 from damadics_fd.ros.diagnostics import Diagnostics, Level, Report
 from damadics_fd.ros.entities import Entities
 from damadics_fd.ros.parameters import Parameters
+from damadics_fd.ros.raw import sample_of
 from damadics_fd.ros.spin import StartError, spin_all
 from damadics_fd.store.alarms import default_folder
 from damadics_fd.store.fleet_file import FleetError, Valve, read_fleet

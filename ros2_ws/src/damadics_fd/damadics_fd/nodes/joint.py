@@ -1,0 +1,80 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Estimator and detector of one valve in one process: estimates go from one to the other directly.
+
+Over DDS this hop costs more than everything else that a sample needs.
+"""
+
+from collections import deque
+from collections.abc import Callable
+
+from damadics_fd.core.approximator.state import Estimate
+
+MOST_ECHOES = 100_000  # as many as the queue of samples holds
+
+
+class Taker:
+    """
+    A detector that is handed estimates.
+
+    :param take: called with each estimate and its tag.
+    """
+
+    def __init__(self, take: Callable[[Estimate, str], None]) -> None:
+        self.take = take
+        self._echoes: deque[int] = deque(maxlen=MOST_ECHOES)
+
+    def sent(self, stamp: int) -> None:
+        """
+        Note an estimate that was also published: DDS will bring it to this detector too.
+
+        :param stamp: of the estimate [ns].
+        """
+        self._echoes.append(stamp)
+
+    def is_echo(self, stamp: int | None) -> bool:
+        """
+        Tell whether DDS brings what was handed over already, once for each.
+
+        :param stamp: of a message that has arrived [ns].
+        :return: True if so; those that were lost before it are forgotten.
+        """
+        if stamp not in self._echoes:
+            return False
+        while self._echoes.popleft() != stamp:
+            pass
+        return True
+
+
+class Joint:
+    """Hold the detectors of one process that take the estimates of one topic."""
+
+    def __init__(self) -> None:
+        self.takers: list[Taker] = []
+
+    def hand(self, estimate: Estimate, tag: str) -> None:
+        """
+        Give an estimate to the detectors.
+
+        :param estimate: of a sample.
+        :param tag: of the actuator.
+        """
+        for taker in self.takers:
+            taker.take(estimate, tag)
+
+
+class Joints:
+    """The joints of a process, by topic."""
+
+    def __init__(self) -> None:
+        self._joints: dict[str, Joint] = {}
+
+    def at(self, topic: str) -> Joint:
+        """
+        Return the joint of a topic.
+
+        :param topic: resolved name.
+        :return: one and the same for estimator and detector.
+        """
+        return self._joints.setdefault(topic, Joint())

@@ -1,0 +1,44 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""What DDS brings again of an estimate that was handed over is told from what is foreign."""
+
+import pytest
+
+pytest.importorskip('damadics_msgs.msg')
+from damadics_fd.nodes.joint import Joints, Taker
+from damadics_fd.ros.raw import any_sample, stamp_of, tagged_sample
+from damadics_msgs.msg import Estimate, Measurement
+from rclpy.serialization import serialize_message
+
+
+def test_an_echo_is_known_once():
+    taker = Taker(lambda estimate, tag: None)
+    for stamp in (1, 2, 3):
+        taker.sent(stamp)
+    assert taker.is_echo(1)
+    assert not taker.is_echo(1)
+    assert taker.is_echo(3)
+    assert not taker.is_echo(2)  # 2 was lost on the way: what has its stamp now is another's
+    assert not taker.is_echo(None)
+
+
+def test_a_joint_is_of_one_topic():
+    joints = Joints()
+    handed = []
+    joints.at('/a/estimate').takers.append(Taker(lambda *given: handed.append(given)))
+    joints.at('/b/estimate').hand('of b', 'B')
+    joints.at('/a/estimate').hand('of a', 'A')
+    assert handed == [('of a', 'A')]
+
+
+@pytest.mark.parametrize('tag', ['', 'LV-101', 'Ventil für Öl'])
+def test_stamp_and_tag_are_read_from_bytes(tag):
+    message = Measurement(cv=0.1, x1=0.2)
+    message.header.frame_id = tag
+    message.header.stamp.sec, message.header.stamp.nanosec = 3, 4
+    data = serialize_message(message)
+    assert tagged_sample(data) == any_sample(data)
+    assert tagged_sample(data)[1] == tag
+    estimate = Estimate(header=message.header)
+    assert stamp_of(serialize_message(estimate)) == 3_000_000_004
+    assert stamp_of(b'\0\1\0\0\1') is None

@@ -1,0 +1,79 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Estimator and detector in one process: joined inside, and outside as two nodes over DDS."""
+
+import pytest
+from damadics_bringup.processes import parameters
+from damadics_fd.ros import qos
+from damadics_msgs.msg import Estimate, FaultFlag, Float64Stamped
+from driven_valve import SETTINGS, Valve
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
+
+pytestmark = pytest.mark.ros
+HEALTHY = FaultFlag.STATE_HEALTHY
+
+
+def values(valve, node: str) -> dict[str, str]:
+    report = valve.report(node)
+    return {v.key: v.value for v in report.values} if report else {}
+
+
+def test_joined_nodes_are_two_nodes_to_everybody_else(processes, peer):
+    words = parameters(**SETTINGS, alarm_folder='')
+    processes.start(
+        'damadics_fd', 'monitors', ['estimator', *parameters(**SETTINGS), '--', 'detector', *words]
+    )
+    valve = Valve(peer)
+    graph = peer.node
+    assert peer.wait(lambda: valve.flags and graph.count_subscribers('/measurement') == 1, 60.0)
+    assert peer.wait(lambda: peer.publisher.get_subscription_count() == 1)
+
+    # with nobody else listening, it judges and raises alarms
+    assert valve.run_until(lambda: valve.flags[-1].state == HEALTHY)
+    valve.raise_alarm()
+    assert graph.count_publishers('/estimate') == graph.count_subscribers('/estimate') == 1
+
+    # who subscribes gets every sample once, and the detector hears none twice
+    heard = {
+        'estimate': peer.listen(Estimate, 'estimate', qos.SAMPLES),
+        'residual': peer.listen(Float64Stamped, 'residual', qos.SAMPLES),
+        'threshold': peer.listen(Float64Stamped, 'threshold', qos.SAMPLES),
+    }
+    assert valve.run_until(lambda: all(heard.values()))
+    valve.run(2.0)
+    peer.wait(lambda: False, 0.5)
+    for topic, messages in heard.items():
+        stamps = [m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for m in messages]
+        assert stamps == list(range(stamps[0], valve.stamp, 10_000_000)), topic
+        assert {m.header.frame_id for m in messages} == {'LC74_20'}
+    assert valve.run_until(
+        lambda: int(values(valve, 'detector').get('Estimates judged', 0)) >= len(heard['residual'])
+    )
+    assert values(valve, 'detector')['Estimates received twice'] == '0'
+
+    # another estimator of the same valve is told
+    other = graph.create_publisher(Estimate, 'estimate', qos.SAMPLES)
+    assert peer.wait(lambda: other.get_subscription_count() == 2)  # the detector and this test
+    peer.wait(lambda: False, 0.3)
+    other.publish(heard['estimate'][-1])
+    assert valve.run_until(lambda: values(valve, 'detector')['Estimates received twice'] == '1')
+    graph.destroy_publisher(other)
+
+    # a detector that is inactive judges nothing, and goes on where it is told to
+    valve.calm()
+    for step, state in (
+        (Transition.TRANSITION_DEACTIVATE, FaultFlag.STATE_NOT_MONITORING),
+        (Transition.TRANSITION_CLEANUP, None),
+        (Transition.TRANSITION_CONFIGURE, FaultFlag.STATE_NOT_MONITORING),
+        (Transition.TRANSITION_ACTIVATE, HEALTHY),
+    ):
+        done = valve.call(ChangeState, 'detector/change_state', transition=Transition(id=step))
+        assert done.success
+        if state is None:
+            heard['estimate'].clear()  # the estimator is then on its own
+            assert valve.run_until(lambda: len(heard['estimate']) > 10)
+        else:
+            assert valve.run_until(lambda state=state: valve.flags[-1].state == state)
+    processes.end('monitors', 20.0)
+    assert 'internal error' not in processes.log('monitors').read_text()
