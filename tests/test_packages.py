@@ -31,6 +31,7 @@ DISTRIBUTIONS = {
     'google': 'protobuf',
     'prometheus_client': 'prometheus-client',
     'paho': 'paho-mqtt',
+    'fpdf': 'fpdf2',
 }
 KEYS = {'PIL': 'python3-pil', 'dask': 'python3-dask'}
 IMPLIED = {'rosidl_default_runtime', 'ros2cli', 'ros2launch'}  # run, never imported

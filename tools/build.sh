@@ -11,6 +11,16 @@ export PATH="$root/.venv/bin:$PATH"
 if [ -d .venv/share/ament_index ]; then
   export AMENT_PREFIX_PATH="$root/.venv" CMAKE_PREFIX_PATH="$root/.venv"
 fi
+# What was renamed or deleted since the last build would stay importable; compiled loops may stay.
+for package in ros2_ws/src/*/setup.py; do
+  name=$(basename "$(dirname "$package")")
+  rm -rf "ros2_ws/build/$name"
+  for site in ros2_ws/install/"$name"/lib/python3*/site-packages; do
+    [ -d "$site" ] || continue
+    rm -rf "$site"/"$name"*.egg-info
+    find "$site/$name" -name '*.py' -delete
+  done
+done
 mkdir -p ros2_ws/log
 log=ros2_ws/log/build.txt
 echo 'Building the workspace ...'

@@ -66,7 +66,7 @@ def test_runs_repeat_and_seeds_differ():
 
 def test_a_unit_finds_and_names_the_fault(spring_results):
     ours, fixed, model = spring_results
-    assert ours['indices']['t_dt'] <= 1.0
+    assert ours['indices']['t_dt'] <= 2.0  # one sample alone never raises an alarm
     assert ours['indices']['r_fd'] == 0.0
     assert ours['indices']['f_sd'] == 0.75
     assert ours['isolation']['right_first']

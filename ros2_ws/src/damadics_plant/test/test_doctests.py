@@ -9,10 +9,13 @@ import pkgutil
 import damadics_plant
 import pytest
 
-MODULES = sorted({m.name for m in pkgutil.iter_modules(damadics_plant.__path__)} - {'plant'})
+NODE = 'damadics_plant.plant'
+MODULES = sorted(
+    {m.name for m in pkgutil.walk_packages(damadics_plant.__path__, 'damadics_plant.')} - {NODE}
+)
 
 
 @pytest.mark.parametrize('name', MODULES)
 def test_examples(name):
-    result = doctest.testmod(importlib.import_module(f'damadics_plant.{name}'))
+    result = doctest.testmod(importlib.import_module(name))
     assert result.failed == 0

@@ -112,7 +112,7 @@ def test_members_of_two_modes_decide_as_single_monitors():
         mine = [event for valve, event in happened if valve == number]
         assert mine == alone.events
         bank, place = members.at(number)
-        assert bank.decisions[place].tobytes() == alone.decisions[-1].tobytes()
+        assert bank.decisions[place].item() == alone.decisions[-1].item()
     assert len(happened) > 10
 
 
