@@ -8,9 +8,15 @@ and open in a browser. Every sample is counted where it is sent, where the estim
 where the detector judges it.
 
     python benchmarks/bench_fleet.py --valves 10 --rate 200 --seconds 60
+
+With --json instead: what process `fleet`, joined monitors and the compiled loops cost, as ratios
+of one run (`many_valves.py` says how).
+
+    python benchmarks/bench_fleet.py --json fleet.json
 """
 
 import argparse
+import json
 import os
 import re
 import sys
@@ -19,6 +25,7 @@ import time
 from collections import defaultdict
 from pathlib import Path
 
+import many_valves
 import rclpy
 from damadics_bringup.launcher import Task, tasks_of
 from damadics_bringup.processes import Processes, free_domain, surroundings
@@ -228,8 +235,19 @@ def main() -> None:
         help='all estimators and detectors in N processes; 0: each in its own',
     )
     parser.add_argument('--seconds', type=float, default=60.0, help='length of the run [s]')
+    parser.add_argument(
+        '--json', type=Path, metavar='FILE', help='measure many valves instead, write figures here'
+    )
+    options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        measure(parser.parse_args(), Path(folder))
+        if options.json:
+            os.environ.update(surroundings(free_domain()), XDG_STATE_HOME=f'{folder}/state')
+            found = many_valves.figures(Path(folder))
+            options.json.write_text(json.dumps(found, indent=2) + '\n')
+            for name, value in found.items():
+                print(f'{name:28s} {value:12.4g}')
+        else:
+            measure(options, Path(folder))
 
 
 if __name__ == '__main__':
