@@ -122,7 +122,8 @@ def test_a_valve_that_falls_silent_is_not_healthy():
     stamp = DATE + np.arange(3) * SECOND
     half = np.full(3, 0.5)
     rows = blocks.Rows(np.zeros(3, np.int64), stamp, {'cv': half, 'x1': half})
-    members.take(rows)
+    assert members.take(rows).changed == {0}
+    assert not members.take(blocks.Rows(rows.valve, rows.stamp + 3 * SECOND, rows.signals)).changed
     ages.heard(rows.valve, rows.stamp, 10.0)
     now = int(stamp[-1])
     fresh, old = ages.ages(now + SECOND, 11.0), ages.ages(now + 5 * SECOND, 15.0)

@@ -143,10 +143,12 @@ class FleetNode(Node):
             return
         self._keeping.begin(rows.valve, rows.stamp)
         self._ages.heard(rows.valve, rows.stamp, time.monotonic())
-        happened, refused = self._members.take(rows)
+        taken = self._members.take(rows)
         self._judged += len(rows.valve)
-        self._rejected += refused
-        self._tell(happened)
+        self._rejected += taken.refused
+        self._tell(taken.happened)
+        for number in taken.changed - {number for number, _ in taken.happened}:
+            self._publish_flag(number)
 
     def _gather(self, number: int, data: bytes) -> None:
         self._gathered.append((number, sample_of(data)))

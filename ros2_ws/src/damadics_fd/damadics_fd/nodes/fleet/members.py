@@ -54,6 +54,14 @@ class Happening(NamedTuple):
     event: Event
 
 
+class Taken(NamedTuple):
+    """Hold what became of rows."""
+
+    happened: list[Happening]  # transitions of alarms, those of a valve in the order of its rows
+    refused: int  # rows
+    changed: set[int]  # valves whose flag shows something else
+
+
 class Members:
     """
     The valves by number, and their monitors.
@@ -89,28 +97,30 @@ class Members:
         """
         return self.banks[int(self._bank[valve])], int(self._place[valve])
 
-    def take(self, rows: Rows) -> tuple[list[Happening], int]:
+    def take(self, rows: Rows) -> Taken:
         """
         Let the monitors judge samples.
 
         :param rows: checked rows.
-        :return: the transitions of alarms in the order of the rows; how many rows were refused.
+        :return: what became of them.
         """
         if len(self.banks) == 1:
             return self._take(0, rows)
-        happened: list[Happening] = []
-        refused = 0
+        together = Taken([], 0, set())
         bank = self._bank[rows.valve]
         for b in range(len(self.banks)):
             mine = bank == b
             if mine.any():
                 signals = {name: column[mine] for name, column in rows.signals.items()}
-                some, lost = self._take(b, Rows(rows.valve[mine], rows.stamp[mine], signals))
-                happened += some
-                refused += lost
-        return happened, refused
+                some = self._take(b, Rows(rows.valve[mine], rows.stamp[mine], signals))
+                together = Taken(
+                    together.happened + some.happened,
+                    together.refused + some.refused,
+                    together.changed | some.changed,
+                )
+        return together
 
-    def _take(self, b: int, rows: Rows) -> tuple[list[Happening], int]:
+    def _take(self, b: int, rows: Rows) -> Taken:
         changes = self.banks[b].take(self._place[rows.valve], rows.stamp, rows.signals)
         refused = int(np.count_nonzero(changes.reason))
         told = np.flatnonzero(changes.decisions['transitions'])
@@ -119,7 +129,7 @@ class Members:
             for n in told
             for event in events_in(changes.decisions[n : n + 1])
         ]
-        return happened, refused
+        return Taken(happened, refused, set(rows.valve[changes.row].tolist()))
 
     def column(self, name: str, kind: type[Number], *, estimate: bool = False) -> NDArray[Number]:
         """
