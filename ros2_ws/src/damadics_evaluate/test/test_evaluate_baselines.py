@@ -15,7 +15,7 @@ from damadics_evaluate.baselines.residuals import (
     Glr,
     SmartPositioner,
 )
-from damadics_fd.core.scada.actuator import nominal_flow
+from damadics_fd.core.scada.laws.actuator import nominal_flow
 from damadics_fd.core.valve.parameters import Valve
 
 T, CV, X, P1, P2, T1, F = range(7)

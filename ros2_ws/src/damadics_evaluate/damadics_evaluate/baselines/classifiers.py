@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
-from damadics_fd.core.scada.isolation import group_of
+from damadics_fd.core.scada.naming.isolation import group_of
 
 from damadics_evaluate.baselines import windows
 from damadics_evaluate.baselines.windows import STEP, WINDOW, Features

@@ -4,7 +4,7 @@
 
 import numpy as np
 from damadics_fd.core.jit import jit
-from damadics_fd.core.scada.actuator import nominal_flow
+from damadics_fd.core.scada.laws.actuator import nominal_flow
 from damadics_fd.core.valve.parameters import Valve
 
 from damadics_evaluate.columns import Floats

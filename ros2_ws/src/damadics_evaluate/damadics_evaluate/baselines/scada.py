@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 from damadics_fd.core import scada
-from damadics_fd.core.scada.cusum import TEST_NAMES
-from damadics_fd.core.scada.isolation import Isolation
+from damadics_fd.core.scada.judging.cusum import TEST_NAMES
 from damadics_fd.core.scada.learning import learn
 from damadics_fd.core.scada.monitor import ScadaMonitor
+from damadics_fd.core.scada.naming.isolation import Isolation
 from damadics_fd.core.scada.settings import ScadaSettings
 from damadics_fd.core.scada.state import HISTORY_LENGTH
 

@@ -5,7 +5,7 @@
 from collections.abc import Sequence
 
 import numpy as np
-from damadics_fd.core.scada.isolation import group_of
+from damadics_fd.core.scada.naming.isolation import group_of
 
 from damadics_evaluate.benchmark.results import Result, plain
 from damadics_evaluate.columns import Floats

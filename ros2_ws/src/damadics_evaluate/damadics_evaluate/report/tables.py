@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from statistics import median
 
-from damadics_fd.core.scada.isolation import NAMES
+from damadics_fd.core.scada.naming.isolation import NAMES
 
 from damadics_evaluate.benchmark.isolation import END, LABELS, PAIR, RIGHT, WRONG
 from damadics_evaluate.benchmark.results import Result

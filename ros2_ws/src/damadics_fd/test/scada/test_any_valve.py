@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from damadics_fd.core.identified import OK, REFUSED, FaultFree
 from damadics_fd.core.scada.estimator import scada_settings
-from damadics_fd.core.scada.identify import identify
+from damadics_fd.core.scada.laws.identify import identify
 from damadics_fd.core.scada.monitor import ScadaMonitor
 from damadics_fd.core.scada.state import Reference
 from damadics_fd.core.settings import Settings

@@ -4,7 +4,7 @@
 
 import numpy as np
 import pytest
-from damadics_fd.core.scada.actuator import nominal_flow, valve_flow
+from damadics_fd.core.scada.laws.actuator import nominal_flow, valve_flow
 from damadics_fd.core.scada.model import FAULTS, STEM, advance_stem, start_stem
 from damadics_fd.core.valve.flow import density
 from damadics_fd.core.valve.parameters import Valve

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from damadics_evaluate.baselines.residuals import FirCusum
-from damadics_fd.core.scada.cusum import TEST_NAMES, siegmund_limit
+from damadics_fd.core.scada.judging.cusum import TEST_NAMES, siegmund_limit
+from damadics_fd.core.scada.judging.limits import cusum_maximum
 from damadics_fd.core.scada.learning import LearningError, learn
-from damadics_fd.core.scada.limits import cusum_maximum
 from damadics_fd.core.scada.monitor import ScadaMonitor
 from damadics_fd.core.scada.settings import ScadaSettings
 from damadics_plant import Fault, load_scenario, simulate

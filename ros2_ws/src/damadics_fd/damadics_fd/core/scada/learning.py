@@ -10,16 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damadics_fd.core.jit import jit
-from damadics_fd.core.scada.clean import despiked, period_of, split
-from damadics_fd.core.scada.cusum import R1
-from damadics_fd.core.scada.fit_flow import FlowFit, better_medium
-from damadics_fd.core.scada.fit_stem import Piece, StemFit, fit_stem
-from damadics_fd.core.scada.limits import friction_limit, is_stationary, set_limits
-from damadics_fd.core.scada.plausible import LearningError, check_flow, check_stem
-from damadics_fd.core.scada.predict import predict
-from damadics_fd.core.scada.pressure import learn_pressure
-from damadics_fd.core.scada.residuals import residuals
-from damadics_fd.core.scada.robust import Floats, huber_weights, loss_of, spread_of
+from damadics_fd.core.scada.judging.cusum import R1
+from damadics_fd.core.scada.judging.limits import friction_limit, is_stationary, set_limits
+from damadics_fd.core.scada.judging.predict import predict
+from damadics_fd.core.scada.judging.pressure import learn_pressure
+from damadics_fd.core.scada.judging.residuals import residuals
+from damadics_fd.core.scada.laws.clean import despiked, period_of, split
+from damadics_fd.core.scada.laws.fit_flow import FlowFit, better_medium
+from damadics_fd.core.scada.laws.fit_stem import Piece, StemFit, fit_stem
+from damadics_fd.core.scada.laws.plausible import LearningError, check_flow, check_stem
+from damadics_fd.core.scada.laws.robust import Floats, huber_weights, loss_of, spread_of
 from damadics_fd.core.scada.settings import ScadaSettings
 from damadics_fd.core.scada.state import (
     BASIC_WEIGHTS,

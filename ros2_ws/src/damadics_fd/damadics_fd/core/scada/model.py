@@ -11,7 +11,7 @@ import math
 
 from damadics_fd.core.jit import jit
 from damadics_fd.core.record import Record
-from damadics_fd.core.scada.actuator import P_RANGE
+from damadics_fd.core.scada.laws.actuator import P_RANGE
 from damadics_fd.core.valve.parameters import Valve
 from damadics_fd.core.valve.plug import recovery
 from damadics_fd.core.valve.pneumatics import (

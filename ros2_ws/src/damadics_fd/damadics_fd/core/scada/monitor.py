@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damadics_fd.core.jit import jit
-from damadics_fd.core.scada.actuator import F_RANGE, P_RANGE, T_RANGE, TPH_PER_KGS
-from damadics_fd.core.scada.cusum import R2, TEST_NAMES, TESTS
-from damadics_fd.core.scada.isolation import Isolation, Isolator
+from damadics_fd.core.scada.judging.cusum import R2, TEST_NAMES, TESTS
+from damadics_fd.core.scada.judging.predict import predict
+from damadics_fd.core.scada.judging.residuals import residuals
+from damadics_fd.core.scada.laws.actuator import F_RANGE, P_RANGE, T_RANGE, TPH_PER_KGS
 from damadics_fd.core.scada.learning import LearningError, learn
-from damadics_fd.core.scada.predict import predict
-from damadics_fd.core.scada.residuals import residuals
+from damadics_fd.core.scada.naming.isolation import Isolation, Isolator
 from damadics_fd.core.scada.settings import ScadaSettings
 from damadics_fd.core.scada.state import MONITOR, REFERENCE, MonitorState
 from damadics_fd.core.scada.step import accepts, step

@@ -5,11 +5,11 @@
 from typing import Annotated
 
 from damadics_fd.core.record import Floats, Ints, Record, Rows
-from damadics_fd.core.scada.cusum import TESTS
-from damadics_fd.core.scada.flow_law import FlowLaw
+from damadics_fd.core.scada.judging.cusum import TESTS
+from damadics_fd.core.scada.judging.pressure import TAPS, PressureFilter
+from damadics_fd.core.scada.laws.flow_law import FlowLaw
+from damadics_fd.core.scada.laws.stem_law import StemLaw, StemTrack
 from damadics_fd.core.scada.model import Faults, StemState
-from damadics_fd.core.scada.pressure import TAPS, PressureFilter
-from damadics_fd.core.scada.stem_law import StemLaw, StemTrack
 
 N_TESTS = len(TESTS)
 N_WEIGHTS = 11

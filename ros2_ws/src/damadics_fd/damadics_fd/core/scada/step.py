@@ -3,9 +3,9 @@
 """The compiled step of the SCADA-rate monitor: one sample into two residuals and the tests."""
 
 from damadics_fd.core.jit import jit
-from damadics_fd.core.scada.decide import decide
-from damadics_fd.core.scada.predict import predict
-from damadics_fd.core.scada.residuals import residuals
+from damadics_fd.core.scada.judging.decide import decide
+from damadics_fd.core.scada.judging.predict import predict
+from damadics_fd.core.scada.judging.residuals import residuals
 from damadics_fd.core.scada.settings import ScadaConfig
 from damadics_fd.core.scada.state import MonitorState, Reference
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from damadics_fd.core.scada.fit_stem import StemFit
-from damadics_fd.core.scada.robust import Floats
+from damadics_fd.core.scada.laws.fit_stem import StemFit
+from damadics_fd.core.scada.laws.robust import Floats
 from damadics_fd.core.scada.settings import ScadaSettings
 from damadics_fd.core.scada.state import LAW
 

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from damadics_fd.core.scada.flow_law import FLOW_LAW, GAS, KNOTS, LIQUID, STEP, sizing
-from damadics_fd.core.scada.robust import Floats, effective, huber_weights, spread_of
+from damadics_fd.core.scada.laws.flow_law import FLOW_LAW, GAS, KNOTS, LIQUID, STEP, sizing
+from damadics_fd.core.scada.laws.robust import Floats, effective, huber_weights, spread_of
 
 SLOPE, SLOPE_SPREAD = -4.0, 2.0
 LAST_SLOPE, LAST_SPREAD = -8.0, 6.0  # between the last two knots the port closes

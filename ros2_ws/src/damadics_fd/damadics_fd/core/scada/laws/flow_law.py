@@ -14,7 +14,7 @@ from typing import Annotated
 
 from damadics_fd.core.jit import jit
 from damadics_fd.core.record import Floats, Record
-from damadics_fd.core.scada.actuator import P_RANGE, T_RANGE
+from damadics_fd.core.scada.laws.actuator import P_RANGE, T_RANGE
 from damadics_fd.core.valve.flow import density, vapour_pressure
 
 KNOTS = 11

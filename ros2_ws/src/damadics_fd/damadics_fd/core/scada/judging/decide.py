@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from damadics_fd.core.jit import jit
-from damadics_fd.core.scada.cusum import FRICTION_TEST, R1, R2, TESTS
+from damadics_fd.core.scada.judging.cusum import FRICTION_TEST, R1, R2, TESTS
 from damadics_fd.core.scada.state import LAW, N_RESIDUALS, N_TESTS, MonitorState, Reference
 
 LLR_CLIP = 8.0

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damadics_fd.core.jit import jit
-from damadics_fd.core.scada.actuator import F_RANGE, P_RANGE, T_RANGE, valve_flow
-from damadics_fd.core.scada.cusum import P1, P2, PROCESS, R2, T1, TESTS
+from damadics_fd.core.scada.judging.cusum import P1, P2, PROCESS, R2, T1, TESTS
+from damadics_fd.core.scada.laws.actuator import F_RANGE, P_RANGE, T_RANGE, valve_flow
 from damadics_fd.core.scada.model import (
     COARSE_SUB_STEPS,
     FAULTS,
@@ -25,9 +25,16 @@ from damadics_fd.core.scada.model import (
     advance_stem,
     copy_stem,
 )
-from damadics_fd.core.scada.names import EQUAL, GROUPS, NAMES, Hypothesis, Isolation, group_of
+from damadics_fd.core.scada.naming.names import (
+    EQUAL,
+    GROUPS,
+    NAMES,
+    Hypothesis,
+    Isolation,
+    group_of,
+)
+from damadics_fd.core.scada.naming.witness import by_witnesses
 from damadics_fd.core.scada.state import HISTORY_LENGTH, LAW
-from damadics_fd.core.scada.witness import by_witnesses
 
 __all__ = ['GROUPS', 'NAMES', 'Hypothesis', 'Isolation', 'Isolator', 'group_of']
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from damadics_fd.core.scada.robust import Floats, effective, huber_weights, loss_of, spread_of
-from damadics_fd.core.scada.stem_law import (
+from damadics_fd.core.scada.laws.robust import Floats, effective, huber_weights, loss_of, spread_of
+from damadics_fd.core.scada.laws.stem_law import (
     FAST,
     STEM_LAW,
     STEM_TRACK,

@@ -5,11 +5,8 @@
 import math
 
 from damadics_fd.core.jit import jit
-from damadics_fd.core.scada.actuator import nominal_flow
-from damadics_fd.core.scada.decide import silence
-from damadics_fd.core.scada.flow_law import characteristic, sizing
-from damadics_fd.core.scada.model import advance_stem, copy_stem, start_stem
-from damadics_fd.core.scada.pressure import (
+from damadics_fd.core.scada.judging.decide import silence
+from damadics_fd.core.scada.judging.pressure import (
     GATE,
     TAPS,
     fuse_pressure,
@@ -17,9 +14,12 @@ from damadics_fd.core.scada.pressure import (
     predict_pressure,
     push,
 )
+from damadics_fd.core.scada.laws.actuator import nominal_flow
+from damadics_fd.core.scada.laws.flow_law import characteristic, sizing
+from damadics_fd.core.scada.laws.stem_law import advance_track, position, start_track
+from damadics_fd.core.scada.model import advance_stem, copy_stem, start_stem
 from damadics_fd.core.scada.settings import ScadaConfig
 from damadics_fd.core.scada.state import HISTORY_LENGTH, LAW, MonitorState, Reference
-from damadics_fd.core.scada.stem_law import advance_track, position, start_track
 
 FORGET_S = 300.0
 SETTLING_PERIODS = 10.0

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from damadics_fd.core.scada.robust import Floats, spread_of
+from damadics_fd.core.scada.laws.robust import Floats, spread_of
 
 ISOLATED = 8.0  # sigma of the change from sample to sample
 MEASURED = (2, 3, 4, 5, 6)  # columns that a transmitter sends; CV is what was commanded

@@ -10,16 +10,16 @@ from numpy.typing import NDArray
 
 from damadics_fd.core.identified import LIMITED, OK, REFUSED, FaultFree, Identified
 from damadics_fd.core.record import Plain
-from damadics_fd.core.scada.actuator import F_RANGE, P_RANGE
-from damadics_fd.core.scada.clean import period_of
 from damadics_fd.core.scada.estimator import scada_settings
-from damadics_fd.core.scada.flow_law import GAS
+from damadics_fd.core.scada.judging.residuals import DOUBT, FLOW_HOURS, HOURS_S, STEM_HOURS
+from damadics_fd.core.scada.laws.actuator import F_RANGE, P_RANGE
+from damadics_fd.core.scada.laws.clean import period_of
+from damadics_fd.core.scada.laws.flow_law import GAS
+from damadics_fd.core.scada.laws.robust import Floats
+from damadics_fd.core.scada.laws.stem_law import FAST
 from damadics_fd.core.scada.learning import LearningError, learn
 from damadics_fd.core.scada.monitor import scada_samples
-from damadics_fd.core.scada.residuals import DOUBT, FLOW_HOURS, HOURS_S, STEM_HOURS
-from damadics_fd.core.scada.robust import Floats
 from damadics_fd.core.scada.state import LAW, Reference
-from damadics_fd.core.scada.stem_law import FAST
 from damadics_fd.core.settings import Settings
 
 BETWEEN_S = 3600.0  # set between recordings, so that none runs on into the next

@@ -5,11 +5,11 @@
 import math
 
 from damadics_fd.core.jit import jit
-from damadics_fd.core.scada.cusum import P1, P2, PROCESS, R1, R2, T1
-from damadics_fd.core.scada.flow_law import flow_doubt
-from damadics_fd.core.scada.predict import repeated
+from damadics_fd.core.scada.judging.cusum import P1, P2, PROCESS, R1, R2, T1
+from damadics_fd.core.scada.judging.predict import repeated
+from damadics_fd.core.scada.laws.flow_law import flow_doubt
+from damadics_fd.core.scada.laws.stem_law import outside, stem_doubt, transient_doubt
 from damadics_fd.core.scada.state import HISTORY_LENGTH, LAW, N_WEIGHTS, MonitorState, Reference
-from damadics_fd.core.scada.stem_law import outside, stem_doubt, transient_doubt
 
 DOUBT = 3.0  # standard deviations of a law that are no evidence
 X = 2  # place of the position among the signals

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from damadics_fd.core.jit import jit
-from damadics_fd.core.scada.cusum import PROCESS, R1, R2, TESTS, siegmund_limit
-from damadics_fd.core.scada.decide import LLR_CLIP
-from damadics_fd.core.scada.robust import Floats, block_spread, spread_of
+from damadics_fd.core.scada.judging.cusum import PROCESS, R1, R2, TESTS, siegmund_limit
+from damadics_fd.core.scada.judging.decide import LLR_CLIP
+from damadics_fd.core.scada.laws.robust import Floats, block_spread, spread_of
 from damadics_fd.core.scada.settings import ScadaSettings
 from damadics_fd.core.scada.state import LAW
 

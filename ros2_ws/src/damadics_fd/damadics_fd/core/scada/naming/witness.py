@@ -20,9 +20,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from damadics_fd.core.scada.cusum import PROCESS, R1, R2
-from damadics_fd.core.scada.names import Hypothesis, Isolation
-from damadics_fd.core.scada.robust import spread_of
+from damadics_fd.core.scada.judging.cusum import PROCESS, R1, R2
+from damadics_fd.core.scada.laws.robust import spread_of
+from damadics_fd.core.scada.naming.names import Hypothesis, Isolation
 
 FIRST_S = 6.0  # what comes within this time of the first sign comes first
 CLEAR = 8.0  # nats for a witness that hardly errs
