@@ -25,6 +25,10 @@ class Sequence:
             self._recent += number - self._last - 1
         self._last = number
 
+    def settle_unchanged(self) -> None:
+        """Count what was missed since the last call, where the publishers are known the same."""
+        self.settle(self._sources)
+
     def settle(self, sources: Iterable[bytes]) -> None:
         """
         Count what was missed since the last call if there was one publisher and no other came.

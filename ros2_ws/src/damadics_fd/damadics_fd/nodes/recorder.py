@@ -217,6 +217,9 @@ class Recorder(Node):
     def _report(self) -> None:
         """Publish what is recorded, waiting, lost and dropped."""
         spool, bag = self._spool, self._spool.bag
+        if not self._changed.is_set():
+            for recorded in self._recorded.values():
+                recorded.sequence.settle_unchanged()
         status = DiagnosticStatus(
             name='recorder: bag',
             hardware_id=str(bag.path),
