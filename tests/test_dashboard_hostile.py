@@ -166,14 +166,15 @@ def test_a_page_whose_server_is_gone_turns_grey_within_two_seconds(site, browser
 
 
 def test_a_silent_valve_shows_that_and_its_open_alarm(site, browser):
+    page = browser.new_page()
+    page.goto(f'{site.address}/valve/mute')
+    page.wait_for_selector('text=There is no valve mute')
     site.voices.flag('mute', FaultFlag.STATE_ALARM, 'LV-2', occurrence=1, level=1, fault=True)
     site.voices.event(
         'mute', FaultEvent.RAISED, 'LV-2', occurrence=1, level=1, cause='friction_up',
         strength=1.65, confidence=0.99, ratio=0.73,
     )  # fmt: skip
-    page = browser.new_page()
-    page.goto(f'{site.address}/valve/mute')
-    page.wait_for_selector('.banner[data-kind=M]', timeout=90_000)
+    page.wait_for_selector('.banner[data-kind=M]', timeout=30_000)
     site.voices.silent.add('mute')
     page.wait_for_selector('.banner[data-kind=off] >> text=Friction is 2.6 times normal')
     assert page.locator('.alarm >> text=Check the packing').is_visible()

@@ -4,6 +4,8 @@
 
 import json
 import math
+import os
+import signal
 import time
 
 import paho.mqtt.client as paho
@@ -28,11 +30,16 @@ class Program:
         self.got: list[tuple[str, bytes, bool]] = []
         self.client = paho.Client(paho.CallbackAPIVersion.VERSION2)
         self.client.on_message = lambda c, u, m: self.got.append((m.topic, m.payload, m.retain))
+        self.joined = 0  # how often it has subscribed
         self.client.on_connect = lambda c, *_: [c.subscribe(topic, 1) for topic in topics]
+        self.client.on_subscribe = self._count
         self.client.reconnect_delay_set(1, 1)
         self.client.connect('127.0.0.1', port, 5)
         self.client.loop_start()
         assert wait_for(self.client.is_connected)
+
+    def _count(self, *_) -> None:
+        self.joined += 1
 
     def publish(self, topic: str, content, quality: int = 1) -> None:
         data = content if isinstance(content, bytes) else json.dumps(content).encode()
@@ -166,7 +173,11 @@ def test_judgements_out_survive_the_broker_and_say_when_we_are_gone(
     for n in range(5):
         detectors.judge('lv1', FaultEvent.CHANGED, f'change {n}')
         time.sleep(0.2)
+    os.kill(processes.pid('mqtt'), signal.SIGSTOP)  # else it may be back before the reader is
+    again = reader.joined + 2
     broker.start()
+    assert wait_for(lambda: reader.joined >= again, 30.0)
+    os.kill(processes.pid('mqtt'), signal.SIGCONT)
     assert wait_for(lambda: len(reader.of('site/fd/lv1/event')) >= 6, 30.0)
     texts = [json.loads(each)['text'] for each in reader.of('site/fd/lv1/event')]
     assert list(dict.fromkeys(texts)) == ['friction up', *(f'change {n}' for n in range(5))]

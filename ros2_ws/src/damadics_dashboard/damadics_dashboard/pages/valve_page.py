@@ -57,6 +57,7 @@ def valve_page(watcher: Watcher, address: str, window: float = 60.0, days: str =
                 address='/',
                 link=t('all_valves'),
             )
+            ui.timer(0.5, lambda: ui.navigate.reload() if name in watcher.valves else None)
         return
     watcher.want(name)
     tagged = valve.tag and valve.tag != valve.title
