@@ -25,7 +25,7 @@ demo-plant: $(BUILT) ## a simulated plant behind OPC UA: a fault, and who hears 
 	@$(ENV) && ros2 run damadics_bringup demo_plant $(ARGS)
 
 test: $(BUILT) $(READERS) ## run all tests
-	@$(ENV) && python -m pytest -m 'not slow' -o pythonpath=tests $(ARGS)
+	@$(ENV) && tools/test.sh $(ARGS)
 
 report: $(BUILT) ## the benchmark's 44 scenarios x all detectors: docs/results/ (minutes; more: SEEDS=20)
 	@$(ENV) && ros2 run damadics_evaluate evaluate run --out results/campaign --first-seed 1000 --seeds $(SEEDS) --no-report \

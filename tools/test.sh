@@ -1,0 +1,28 @@
+#!/bin/bash
+# Run all tests in two streams side by side: those of running nodes, which wait most of their time,
+# and all others, at low priority. What is given is passed on to pytest.
+set -uo pipefail
+cd "$(dirname "$0")/.."
+
+stream() {
+  local name=$1 which=$2
+  shift 2
+  python -m pytest -m "$which" -o pythonpath=tests -o "cache_dir=.pytest_cache/$name" "$@"
+}
+
+others=$(mktemp)
+trap 'kill "${beside:-}" 2> /dev/null; rm -f "$others"' EXIT
+echo 'Testing in two streams: the nodes here, all others beside it (shown when they are done) ...'
+(renice -n 19 "$BASHPID" > /dev/null; stream others 'not slow and not ros' "$@") > "$others" 2>&1 &
+beside=$!
+stream nodes 'not slow and ros' "$@"
+nodes=$?
+wait "$beside"
+rest=$?
+beside=
+cat "$others"
+# pytest ends with 5 where a stream has no test that was asked for
+for code in "$nodes" "$rest"; do
+  [[ $code == 0 || $code == 5 ]] || exit 1
+done
+[[ $nodes == 0 || $rest == 0 ]] || exit 5
