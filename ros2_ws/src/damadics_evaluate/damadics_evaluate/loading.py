@@ -29,7 +29,7 @@ def load_object(name: str) -> object:
             module = importlib.import_module(place)
     except ValueError:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         # any error of the user's file is the user's to see, in one line
         raise ValueError(f'{place} cannot be imported: {told(error)}') from error
     if not hasattr(module, wanted):

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from damadics_evaluate import main
 from damadics_evaluate.baselines import DETECTORS
+from damadics_evaluate.benchmark import paper
 from damadics_evaluate.columns import SCALE, columns_of, rows_of
 from damadics_evaluate.detectors.check import problems
 from damadics_evaluate.detectors.find import find_detector
@@ -191,27 +192,84 @@ def test_a_scenario_of_ones_own_has_its_zones(tmp_path):
         case(f'{quiet}:a')
 
 
-def test_run_report_and_paper_take_what_is_ones_own(tmp_path, bad, capsys, monkeypatch):
-    monkeypatch.chdir(EXAMPLE)
+@pytest.fixture
+def outside(tmp_path, monkeypatch):
+    """Detectors, a scenario and a fault outside the repository; one of them installed."""
+    folder = tmp_path / 'mine'
+    shutil.copytree(EXAMPLE, folder)
+    (folder / 'sluggish-1.0.dist-info').mkdir()
+    meta = {
+        'METADATA': 'Metadata-Version: 2.1\nName: sluggish\nVersion: 1.0\n',
+        'entry_points.txt': '[damadics_evaluate.detectors]\nsluggish = my:Sluggish\n',
+    }
+    for name, text in meta.items():
+        (folder / 'sluggish-1.0.dist-info' / name).write_text(text)
+    monkeypatch.syspath_prepend(folder)
+    monkeypatch.chdir(folder)
+    return folder
+
+
+def refusals(err, *names):
+    """Assert that those detectors were refused by name, each in one line."""
+    for name in names:
+        assert any('refused' in line and name in line for line in err.splitlines()), (name, err)
+
+
+def test_run_paper_lublin_and_report_take_what_is_ones_own(
+    outside, tmp_path, bad, capsys, monkeypatch
+):
+    monkeypatch.setattr(paper, '_states', lambda *_: [])  # takes seconds, and is not ours to test
     out = tmp_path / 'results'
-    options = ['--out', str(out), '--jobs', '1', '--calibration-days', '1']
-    detectors = ['--detectors', 'online.py:OneSidedCusum', f'{bad}:Peak', f'{bad}:Raises']
+    options = ['--out', str(out), '--jobs', '1', '--calibration-days', '1', '--no-report']
+    good = ['sluggish', 'online.py:OneSidedCusum']
+    detectors = ['--detectors', *good, f'{bad}:Peak', f'{bad}:Raises']
     own = ['--scenarios', 'my.yaml:mine', '--faults', 'my.py:SlackSpring']
     assert main(['run', *options, *detectors, *own]) == 0
-    said = capsys.readouterr()
-    assert 'refused' in said.err
-    assert 'Peak looks ahead' in said.err
-    assert 'Raises raises' in said.err
+    said = capsys.readouterr().err
+    refusals(said, 'Peak looks ahead', 'Raises raises')
     lines = [json.loads(line) for line in (out / 'results.jsonl').read_text().splitlines()]
-    assert {r['detector'] for r in lines} == {'online.py:OneSidedCusum'}
-    assert {r['scenario'] for r in lines} == {'my.yaml:mine', 'my.py:SlackSpring'}
-    assert all(len(r['data_hash']) == 12 for r in lines)
-    slack = next(r for r in lines if r['scenario'] == 'my.py:SlackSpring')
-    assert 0.0 <= slack['indices']['t_dt'] < 600.0
+    scenarios = [r for r in lines if r['kind'] == 'scenario']
+    assert {r['detector'] for r in scenarios} == set(good)
+    assert {r['scenario'] for r in scenarios} == {'my.yaml:mine', 'my.py:SlackSpring'}
+    assert all(len(r['data_hash']) == 12 for r in scenarios)
+    for slack in (r for r in scenarios if r['scenario'] == 'my.py:SlackSpring'):
+        assert 0.0 <= slack['indices']['t_dt'] < 600.0
+
+    assert main(['paper', str(out), *detectors]) == 0
+    refusals(capsys.readouterr().err, 'Peak looks ahead', 'Raises raises')
+    table = {row[0]: row[1:] for row in json.loads((out / 'paper.json').read_text())['rows']}
+    assert table['Sluggish'][2:] == ['0 / 0', '0']
+    assert len(table['OneSidedCusum']) == 4
+    assert next(v for k, v in table.items() if 'Peak' in k) == ['refused'] * 4
+
+    np.savetxt(tmp_path / '17112001.txt', sticking_day(), delimiter='\t', fmt='%.3f')
+    file = str(tmp_path / '17112001.txt')
+    assert main(['lublin', file, *detectors, '--campaign', str(out)]) == 0
+    refusals(capsys.readouterr().out, 'Peak', 'Raises')
+    grid = json.loads((out / 'lublin.json').read_text())['grid']
+    row = next(row for row in grid if row[0].startswith('17 '))
+    assert grid[0][1:3] == good
+    assert [cell.startswith('+') for cell in row[1:3]] == [True, True]
+    assert row[3:] == ['refused', 'refused']
+
+    assert main(['report', str(out)]) == 0
     page = (out / 'index.html').read_text()
-    assert 'SlackSpring' in page
+    assert all(word in page for word in ('SlackSpring', 'OneSidedCusum', 'Sluggish', 'A3 f16'))
     assert 'OneSidedCusum' in (out / 'detection.tex').read_text()
-    shutil.rmtree(out)
+
+
+def sticking_day():
+    """Part of a day in the plant's 33 columns: the stem of actuator 3 sticks during event 17."""
+    rng = np.random.default_rng(3)
+    t = np.arange(55000.0, 57700.0)
+    table = np.full((len(t), 33), np.nan)
+    cv = 50.0 + 10.0 * np.sin(t / 40.0)
+    levels = np.array([600.0, 300.0, 90.0, 20.0])
+    table[:, 0] = t
+    table[:, 23:27] = levels + rng.normal(0.0, 1.0, (len(t), 4))
+    table[:, 27], table[:, 28] = cv, cv + rng.normal(0.0, 0.2, len(t))
+    table[(t >= 57475) & (t <= 57530), 28] -= 9.0
+    return table
 
 
 def test_check_says_what_is_wrong(bad, capsys):

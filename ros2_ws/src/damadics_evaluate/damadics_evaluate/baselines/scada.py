@@ -139,6 +139,10 @@ class ModelThreshold(Detector):
         trace = _shared_trace(self._hour, samples)
         return np.where(self.active(samples), np.abs(trace[self.column]), 0.0)
 
+    def settings(self) -> dict[str, Setting]:
+        """Return a digest of the monitor whose residual it judges."""
+        return {**super().settings(), 'source': _source()}
+
 
 class FlowThreshold(ModelThreshold):
     """Fixed threshold on the monitor's flow residual."""

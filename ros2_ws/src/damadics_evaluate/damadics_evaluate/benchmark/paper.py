@@ -5,6 +5,7 @@
 import base64
 import io
 import json
+import sys
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -18,10 +19,12 @@ from damadics_fd.core.scada.settings import ScadaSettings
 from damadics_fd.core.settings import Settings
 from numpy.typing import NDArray
 
+from damadics_evaluate.baselines import DETECTORS
 from damadics_evaluate.baselines.kalman import FrictionSpringEkf
 from damadics_evaluate.baselines.scada import Scada
 from damadics_evaluate.columns import Floats, rows_of
 from damadics_evaluate.detectors.base import MissingPackageError
+from damadics_evaluate.detectors.check import looks_ahead
 from damadics_evaluate.detectors.find import find_detector
 from damadics_evaluate.detectors.own import RefusedError
 from damadics_evaluate.scenarios.trajectories import NOISE
@@ -35,6 +38,7 @@ CALIBRATION = 3  # fault-free runs of the paper's profile that set the limits of
 MARGIN = 1.1
 REPEATS = 8  # of the paper's CV profile, for the hour the SCADA-rate monitor learns from
 WIDTH, COLOURS = 900, 16  # of the figures in the report
+REFUSED = 'refused'
 COLUMNS = (
     'friction: detected at (s)',
     'spring: detected at (s)',
@@ -53,13 +57,20 @@ Alarms = NDArray[np.float64]  # instants of rising edges, s
 
 @dataclass(frozen=True)
 class Row:
-    """What one detector made of the three runs: instants of its alarms."""
+    """
+    What one detector made of the three runs.
+
+    :param title: of the detector, and why it was refused where it was.
+    :param alarms: instants of its alarms by run; none where it was refused.
+    """
 
     title: str
-    alarms: Mapping[str, Alarms]
+    alarms: Mapping[str, Alarms] | None
 
     def cells(self) -> list[str]:
         """Return the cells of the table."""
+        if self.alarms is None:
+            return [self.title, *(REFUSED for _ in COLUMNS)]
         first = []
         before = []
         for name in RUNS[1:]:
@@ -146,7 +157,12 @@ def _limited(
     statistic: Callable[[Any], Floats], noisy: Mapping[str, Any], quiet: list[Any]
 ) -> dict[str, Alarms]:
     """Return the alarms of a statistic whose limit comes from fault-free runs."""
-    limit = MARGIN * max(float(statistic(q).max()) for q in quiet)
+    return _over(MARGIN * max(float(statistic(q).max()) for q in quiet), statistic, noisy)
+
+
+def _over(
+    limit: float, statistic: Callable[[Any], Floats], noisy: Mapping[str, Any]
+) -> dict[str, Alarms]:
     return {name: _rising(c['stamp'] / 1e9, statistic(c) >= limit) for name, c in noisy.items()}
 
 
@@ -159,9 +175,18 @@ def _baseline(name: str, noisy: Mapping[str, Any], quiet: list[Any]) -> list[Row
     first = rows_of(quiet[0])
     try:
         detector.fit(first[first[:, 0] <= LEARN_UNTIL])
-        alarms = _limited(lambda c: detector.statistic(rows_of(c)), noisy, quiet)
+        if name not in DETECTORS:
+            ahead = looks_ahead(detector, first, detector.statistic(first))
+            if ahead:
+                raise RefusedError(ahead)
+        alarms = (
+            _limited(lambda c: detector.statistic(rows_of(c)), noisy, quiet)
+            if detector.calibrated
+            else _over(1.0, lambda c: detector.statistic(rows_of(c)), noisy)
+        )
     except (MissingPackageError, RefusedError) as error:
-        return [Row(f'{detector.title}: {error}', {n: np.array([]) for n in RUNS})]
+        print(f'evaluate: refused: {error}', file=sys.stderr)
+        return [Row(f'{detector.title} ({error})', None)]
     return [Row(detector.title, alarms)]
 
 
@@ -176,7 +201,7 @@ def _states(noisy: Mapping[str, Any], quiet: list[Any]) -> list[Row]:
     try:
         return [Row(ekf.title, _limited(statistic, noisy, quiet))]
     except MissingPackageError as error:
-        return [Row(f'{ekf.title}: {error}', {n: np.array([]) for n in RUNS})]
+        return [Row(f'{ekf.title} ({error})', None)]
 
 
 def _scada() -> dict[str, Alarms]:

@@ -13,6 +13,7 @@ from damadics_evaluate.loading import told
 
 CUTS = (0.55, 0.8, 0.97)  # of the record, where the end is cut off
 TOLERANCE = 1e-6
+BEYOND = (-3.0, 4.0)
 
 
 def problems(kind: type[Detector], hour: Floats, run: Floats, strict: bool = True) -> list[str]:
@@ -32,7 +33,7 @@ def problems(kind: type[Detector], hour: Floats, run: Floats, strict: bool = Tru
         raise
     except RefusedError as error:
         return [str(error)]
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         # the point of the check: whatever it raises is told under its name
         return [f'{kind.name} raises: {told(error)}']
 
@@ -90,7 +91,7 @@ def looks_ahead(detector: Detector, run: Floats, judged: Floats) -> str:
                 f'{detector.name} looks ahead: without the samples after {n} it judges otherwise'
             )
         other = run.copy()
-        other[n:, CV], other[n:, X] = 0.0, 1.0  # larger than anything that a run shows
+        other[n:, CV], other[n:, X] = BEYOND  # further apart than in any record
         if not _same(judged[:n], _judged(detector, other)[:n]):
             return f'{detector.name} looks ahead: other samples after {n} change its past'
     return ''

@@ -80,7 +80,7 @@ class Own(Detector):
     def _tried(self, doing: str, call: Callable[..., Answer], *arguments: object) -> Answer:
         try:
             return call(*arguments)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             # whatever it raises, it is refused by name and the others go on
             raise RefusedError(f'{self.name} raises when it {doing}: {told(error)}') from error
 
