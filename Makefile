@@ -58,7 +58,7 @@ lint: $(BUILT) ## check style and types
 	@$(MAKE) --no-print-directory types
 
 types: $(BUILT)
-	@$(ENV) && mypy ros2_ws/src/damadics_fd/damadics_fd/core
+	@$(ENV) && mypy
 
 docs: $(BUILT) ## the documentation with the API pages: docs/_build/index.html
 	@$(ENV) && python -m uv pip install --quiet --require-hashes -r tools/requirements/docs.txt \

@@ -194,7 +194,9 @@ def _take_one_signal() -> None:
     def end(number: int, frame: FrameType | None) -> None:
         for other in both:
             signal.signal(other, signal.SIG_IGN)
-        of_server[number](number, frame)
+        handler = of_server[signal.Signals(number)]
+        if callable(handler):
+            handler(number, frame)
 
     for number in both:
         signal.signal(number, end)

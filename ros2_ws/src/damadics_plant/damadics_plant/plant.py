@@ -13,11 +13,10 @@ from damadics_fd.core.sample import SIGNALS
 from damadics_fd.ros import qos
 from damadics_fd.ros.arguments import check_node_arguments
 from damadics_fd.ros.parameters import Parameters
-from damadics_fd.ros.spin import spin
+from damadics_fd.ros.spin import SpinnableNode, spin
 from damadics_msgs.msg import FaultState, Measurement
 from damadics_msgs.srv import InjectFault
 from rclpy.clock import Clock, ClockType
-from rclpy.node import Node
 from rosgraph_msgs.msg import Clock as ClockMessage
 
 from damadics_plant import Simulator
@@ -42,7 +41,7 @@ MESSAGES = {
 PATIENCE = 0.5  # s of wall time behind which the pace is given up
 
 
-class Plant(Node):
+class Plant(SpinnableNode):
     """Play a scenario against the wall clock; stamps count from the scenario's start."""
 
     def __init__(self) -> None:

@@ -96,5 +96,6 @@ def stamps(k: np.ndarray, rate: float) -> np.ndarray:
     if rate >= 1 and rate == int(rate):
         whole, rest = np.divmod(k, int(rate))
         fraction: np.ndarray = np.rint(rest * 1e9 / rate).astype(np.int64)
-        return whole * 1_000_000_000 + fraction
+        exact: np.ndarray = whole * 1_000_000_000 + fraction
+        return exact
     return np.rint(k * 1e9 / rate).astype(np.int64)

@@ -5,14 +5,32 @@
 import asyncio
 import time
 from collections import deque
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import Protocol
 
+from rclpy.client import Client
 from rclpy.node import Node
+
+Field = str | float | bool | list[str]
 
 
 class ServiceError(Exception):
     """A service could not be called; the message says why."""
+
+
+class Answer(Protocol):
+    """What every service answers."""
+
+    success: bool
+    message: str
+
+
+class Service(Protocol):
+    """A type of service, for which rclpy has no name."""
+
+    @property
+    def Request(self) -> Callable[..., object]:
+        """Make a request of its fields."""
 
 
 class Calls:
@@ -20,10 +38,10 @@ class Calls:
 
     def __init__(self) -> None:
         self._waiting: deque[Callable[[], None]] = deque()
-        self._clients: dict[str, Any] = {}
+        self._clients: dict[str, Client] = {}
 
     async def call(
-        self, name: str, kind: Any, patience: float, **request: Any
+        self, name: str, kind: Service, patience: float, request: Mapping[str, Field]
     ) -> tuple[bool, str]:
         """
         Call a service.
@@ -36,9 +54,9 @@ class Calls:
         :raises ServiceError: where nobody answers.
         """
         loop = asyncio.get_running_loop()
-        answer: asyncio.Future[Any] = loop.create_future()
+        answer: asyncio.Future[Answer] = loop.create_future()
 
-        def settle(response: Any) -> None:
+        def settle(response: Answer) -> None:
             if not answer.done():
                 answer.set_result(response)
 

@@ -3,13 +3,11 @@
 """Read serialised messages in batches: a page needs ten looks a second, not every message."""
 
 from functools import cache
-from typing import Any
 
 import numpy as np
 from damadics_fd.bag.cdr.definition import Definition, parse_definition, schema_text
 from damadics_fd.bag.cdr.layout import Layout, layout_of
 from damadics_fd.core.stamps import SECOND as NANO
-from numpy.typing import NDArray
 
 
 @cache
@@ -41,7 +39,7 @@ class Batch:
         """Keep one message; cheap, for it is called for each."""
         self._messages.append(message)
 
-    def drain(self) -> NDArray[Any]:
+    def drain(self) -> np.ndarray:
         """
         Return the columns of all messages since the last call.
 
@@ -56,7 +54,7 @@ class Batch:
             messages = messages[run:]
         return np.concatenate(parts) if parts else np.zeros(0, self.dtype)
 
-    def _decode(self, messages: list[bytes], size: int) -> NDArray[Any]:
+    def _decode(self, messages: list[bytes], size: int) -> np.ndarray:
         data = np.frombuffer(b''.join(messages), np.uint8).reshape(-1, size)
         if self._layout is None or not self._layout.matches(data):
             self._layout = layout_of(_definition(self._kind), self._kind, messages[0])

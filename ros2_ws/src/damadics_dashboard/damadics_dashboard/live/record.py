@@ -3,13 +3,13 @@
 """Messages as rows of the history; their texts come through one door."""
 
 import math
-from typing import Any
 
 from damadics_fd.core.stamps import SECOND as NANO
 from damadics_fd.core.text import COMMENT, NAME, SENTENCE, plain
 from damadics_msgs.msg import FaultEvent, OperatorAction
 
-NUMBERS = ('residual', 'threshold', 'ratio', 'duration', 'confidence', 'strength')
+from damadics_dashboard.store.rows import ActionRow, EventRow
+
 ACTIONS = (
     'acknowledge',
     'reset',
@@ -21,7 +21,7 @@ ACTIONS = (
 )
 
 
-def event_row(valve: str, message: FaultEvent) -> dict[str, Any]:
+def event_row(valve: str, message: FaultEvent) -> EventRow:
     """
     Return an event as the history keeps it.
 
@@ -29,7 +29,7 @@ def event_row(valve: str, message: FaultEvent) -> dict[str, Any]:
     :param message: the event.
     :return: row without `seen`.
     """
-    row: dict[str, Any] = {
+    return {
         'valve': valve,
         'stamp': message.header.stamp.sec * NANO + message.header.stamp.nanosec,
         'onset': message.onset.sec * NANO + message.onset.nanosec,
@@ -39,14 +39,20 @@ def event_row(valve: str, message: FaultEvent) -> dict[str, Any]:
         'cause': plain(message.cause, NAME),
         'text': plain(message.text, SENTENCE),
         'advice': plain(message.advice, SENTENCE),
+        'residual': _known(message.residual),
+        'threshold': _known(message.threshold),
+        'ratio': _known(message.ratio),
+        'duration': _known(message.duration),
+        'confidence': _known(message.confidence),
+        'strength': _known(message.strength),
     }
-    for name in NUMBERS:
-        value = getattr(message, name)
-        row[name] = value if math.isfinite(value) else None
-    return row
 
 
-def action_row(valve: str, message: OperatorAction) -> dict[str, Any]:
+def _known(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def action_row(valve: str, message: OperatorAction) -> ActionRow:
     """
     Return what a person did as the history keeps it.
 

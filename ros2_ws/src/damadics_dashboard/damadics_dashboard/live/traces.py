@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Keep the latest samples of a topic as columns, and thin them out honestly for a plot."""
 
-from typing import Any
-
 import numpy as np
 from damadics_fd.core.stamps import SECOND as NANO
 from numpy.typing import NDArray
@@ -34,7 +32,7 @@ class Trace:
         self._from = self._to = 0
 
     @property
-    def rows(self) -> NDArray[Any]:
+    def rows(self) -> np.ndarray:
         """
         Return what is kept, oldest first.
 
@@ -51,7 +49,7 @@ class Trace:
         """
         return int(self._data['stamp'][self._to - 1]) if self._to > self._from else -1
 
-    def extend(self, rows: NDArray[Any]) -> None:
+    def extend(self, rows: np.ndarray) -> None:
         """
         Add samples; where time jumps back, what was kept belongs to another run and goes.
 
@@ -85,7 +83,7 @@ class Trace:
             self._data[: len(kept)] = kept.copy()
         self._from, self._to = 0, len(kept)
 
-    def since(self, stamp: int) -> NDArray[Any]:
+    def since(self, stamp: int) -> np.ndarray:
         """
         Return the samples from a stamp on.
 
@@ -154,7 +152,7 @@ def _extremes(
     return places[0], places[1]
 
 
-def block_means(rows: NDArray[Any], x: str, y: str, width: int) -> Points:
+def block_means(rows: np.ndarray, x: str, y: str, width: int) -> Points:
     """
     Average two columns over fixed intervals, for a plot of one over the other.
 

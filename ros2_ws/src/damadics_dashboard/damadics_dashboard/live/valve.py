@@ -5,7 +5,7 @@
 import math
 from collections import deque
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from damadics_fd.core.freshness import Freshness, default_max_age
 from damadics_fd.core.stamps import SECOND as NANO
@@ -14,6 +14,7 @@ from damadics_msgs.msg import FaultEvent, FaultFlag, Isolation, Signature
 
 from damadics_dashboard.live.raw import Batch
 from damadics_dashboard.live.traces import Trace
+from damadics_dashboard.store.rows import EventRow
 
 HEARTBEAT_LOST = 2.0  # s; the detector repeats its flag every second
 SAMPLES_LOST = 0.6  # s, or three periods of the samples
@@ -52,7 +53,7 @@ class Alarm:
     state: str  # active, returned, shelved, unknown
     acknowledged: bool
     onset: int  # ns
-    evidence: dict[str, Any] = field(default_factory=dict)
+    evidence: EventRow = field(default_factory=EventRow)
 
 
 class Valve:
@@ -78,7 +79,7 @@ class Valve:
         self.period = 0.0
         self.diagnostics: dict[str, dict[str, str]] = {}
         self.levels: dict[str, int] = {}
-        self.events: deque[dict[str, Any]] = deque(maxlen=100)
+        self.events: deque[EventRow] = deque(maxlen=100)
         self.acknowledged: set[int] = set()
         self.peak = 0.0  # largest residual / threshold of this second
         self.ratio = 0.0  # of the second before
@@ -147,7 +148,7 @@ class Valve:
             self.freshness.heard(stamp, now)
         self.judged = stamp
 
-    def take_event(self, event: dict[str, Any]) -> None:
+    def take_event(self, event: EventRow) -> None:
         """
         Take a transition of the alarm.
 
@@ -287,7 +288,7 @@ class Valve:
         )
         known = self.diagnostics.get('detector', {}).get('Acknowledged') == 'True'
         onset = flag.onset.sec * NANO + flag.onset.nanosec
-        evidence = dict(told[-1]) if told else {}
+        evidence = told[-1].copy() if told else EventRow()
         if evidence and state == 'active':  # the event tells how it was then
             stamp = flag.header.stamp.sec * NANO + flag.header.stamp.nanosec
             evidence |= {

@@ -4,8 +4,7 @@
 
 import threading
 import time
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
 
 import rclpy
 from damadics_fd.core.text import NAME, plain
@@ -26,13 +25,15 @@ from damadics_msgs.msg import (
 )
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
-from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.event_handler import QoSMessageLostInfo, SubscriptionEventCallbacks
 from rclpy.executors import ExternalShutdownException
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+from rclpy.subscription import Subscription
 
-from damadics_dashboard.live.calls import Calls, ServiceError
+from damadics_dashboard.live.calls import Calls, Field, Service, ServiceError
 from damadics_dashboard.live.fleet import FleetReport
 from damadics_dashboard.live.record import action_row, event_row
 from damadics_dashboard.live.trend_points import TrendPoints
@@ -75,7 +76,7 @@ class Watcher:
         self._follow = follow
         self._ros_args = list(ros_args)
         self._wanted: dict[str, float] = {}
-        self._subscriptions: dict[tuple[str, str], Any] = {}
+        self._subscriptions: dict[tuple[str, str], Subscription] = {}
         self._calls = Calls()
         self._fleets: dict[str, FleetReport] = {}
         self._second = 0.0
@@ -157,7 +158,12 @@ class Watcher:
         return _topic(valve, service) in self.services
 
     async def call(
-        self, valve: str, service: str, kind: Any, patience: float = 5.0, **request: Any
+        self,
+        valve: str,
+        service: str,
+        kind: Service,
+        request: Mapping[str, Field],
+        patience: float = 5.0,
     ) -> tuple[bool, str]:
         """
         Call a service of a valve.
@@ -173,11 +179,11 @@ class Watcher:
         name = _topic(valve, service)
         if name not in self.services:
             raise ServiceError(f'nobody serves {name}: is the node running?')
-        return await self._calls.call(name, kind, patience, **request)
+        return await self._calls.call(name, kind, patience, request)
 
     def _run(self) -> None:
         try:
-            rclpy.init(args=self._ros_args, signal_handler_options=rclpy.SignalHandlerOptions.NO)
+            rclpy.init(args=self._ros_args, signal_handler_options=SignalHandlerOptions.NO)
             self._node = Node('dashboard')
             executor = EventsExecutor()
             executor.add_node(self._node)
@@ -295,7 +301,7 @@ class Watcher:
             return
         valve = self.valves[name]
 
-        def lost(event: Any) -> None:
+        def lost(event: QoSMessageLostInfo) -> None:
             valve.lost += event.total_count_change
 
         self._subscriptions[name, topic] = self._node.create_subscription(

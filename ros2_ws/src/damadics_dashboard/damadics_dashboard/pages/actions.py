@@ -3,14 +3,14 @@
 """What an operator can do to a valve: buttons that call its services, and who pressed them."""
 
 from collections.abc import Awaitable, Callable
-from typing import Any
 
 from damadics_fd.core.text import COMMENT, NAME, plain
 from damadics_msgs.srv import Acknowledge, Reference, Relearn, ResetAlarm, Shelve
 from nicegui import ui
 
+from damadics_dashboard.live.calls import Field, Service, ServiceError
 from damadics_dashboard.live.valve import Valve
-from damadics_dashboard.live.watcher import ServiceError, Watcher
+from damadics_dashboard.live.watcher import Watcher
 from damadics_dashboard.pages.elements import box, button, with_values
 from damadics_dashboard.pages.frame import grant, keep_user, user_name
 from damadics_dashboard.words.texts import Texts
@@ -19,7 +19,9 @@ SHELVES = (600.0, 3600.0, 8 * 3600.0, 86400.0)
 Act = Callable[..., Awaitable[bool]]
 
 
-async def call(watcher: Watcher, valve: str, service: str, kind: Any, **request: Any) -> bool:
+async def call(
+    watcher: Watcher, valve: str, service: str, kind: Service, **request: Field
+) -> bool:
     """
     Call a service, keep who did what, and show the answer.
 
@@ -32,7 +34,7 @@ async def call(watcher: Watcher, valve: str, service: str, kind: Any, **request:
     """
     who = grant()
     try:
-        done, text = await watcher.call(valve, service, kind, **request)
+        done, text = await watcher.call(valve, service, kind, request)
     except ServiceError as problem:
         done, text = False, str(problem)
     watcher.note_action(
@@ -98,8 +100,8 @@ class Dialog:
         self._dialog.delete()
 
 
-def _caller(watcher: Watcher, name: str, service: str, kind: Any, **fixed: Any) -> Act:
-    async def act(**given: Any) -> bool:
+def _caller(watcher: Watcher, name: str, service: str, kind: Service, **fixed: Field) -> Act:
+    async def act(**given: Field) -> bool:
         return await call(watcher, name, service, kind, **fixed, **given)
 
     return act

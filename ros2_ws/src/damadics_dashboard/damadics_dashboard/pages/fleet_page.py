@@ -3,7 +3,7 @@
 """The overview: one tile per valve, by area, found by search and class; and every alarm."""
 
 import time
-from typing import Any
+from typing import TypedDict
 
 from damadics_fd.core.text import COMMENT, plain
 from nicegui import ui
@@ -20,7 +20,34 @@ PERIOD = 0.2  # s
 LARGE = 100  # valves from which on the page is drawn twice a second
 KINDS = ('F', 'S', 'M', 'C', 'off', 'learn', 'ok')
 START = 'ros2 run damadics_bringup run --simulate'
-Told = dict[str, Any]
+
+
+class Tile(TypedDict):
+    """What the page's script draws of a valve."""
+
+    kind: str
+    title: str
+    tag: str
+    state: str
+    badge: str
+    hot: bool
+    why: str
+    ratio: str
+    share: float
+    progress: float
+    fresh: str
+    never: str
+    area: str
+    address: str
+    label: str
+
+
+class Changes(TypedDict, total=False):
+    """What has changed on the page since it was told last."""
+
+    tiles: dict[str, Tile]
+    ages: list[float | None]  # s, of all valves
+    order: list[str]
 
 
 def fleet_page(watcher: Watcher) -> None:
@@ -66,10 +93,10 @@ class Tiles:
     def __init__(self, watcher: Watcher, t: Texts) -> None:
         self._watcher = watcher
         self._t = t
-        self._told: dict[str, Told] = {}
+        self._told: dict[str, Tile] = {}
         self._order: list[str] | None = None
 
-    def news(self) -> Told | None:
+    def news(self) -> Changes | None:
         """
         Return what has changed.
 
@@ -77,13 +104,13 @@ class Tiles:
         """
         now, clock = time.monotonic(), self._watcher.clock
         valves = sorted(self._watcher.valves.values(), key=lambda v: (v.area, v.title))
-        changed: dict[str, Told] = {}
+        changed: dict[str, Tile] = {}
         for valve in valves:
             told = tile(valve, self._t, now, clock)
             if self._told.get(valve.name) != told:
                 self._told[valve.name] = changed[valve.name] = told
         ages = [valve.age(now, clock) for valve in valves]
-        message: Told = {
+        message: Changes = {
             'tiles': changed,
             'ages': [None if age is None else round(age, 1) for age in ages],
         }
@@ -93,7 +120,7 @@ class Tiles:
         return message
 
 
-def tile(valve: Valve, t: Texts, now: float, clock: int) -> Told:
+def tile(valve: Valve, t: Texts, now: float, clock: int) -> Tile:
     """
     Say what the tile of a valve shows.
 

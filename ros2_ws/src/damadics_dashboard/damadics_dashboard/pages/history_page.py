@@ -5,7 +5,6 @@
 import csv
 import io
 import time
-from typing import Any
 
 from damadics_fd.core.text import COMMENT, NAME, plain
 from nicegui import ui
@@ -16,6 +15,7 @@ from damadics_dashboard.pages.frame import card, frame, grant, keep_user, may_op
 from damadics_dashboard.pages.valve_words import TRANSITIONS, address, history_rows
 from damadics_dashboard.store.export import cell
 from damadics_dashboard.store.history import ACTION_COLUMNS, COLUMNS, Wanted
+from damadics_dashboard.store.rows import ActionRow
 from damadics_dashboard.words.texts import Texts
 
 DAYS = {0: 'all_time', 1: 'last_day', 7: 'last_week', 30: 'last_month', 365: 'last_year'}
@@ -56,8 +56,8 @@ class _View:
             self._days = ui.select(
                 {n: t(key) for n, key in DAYS.items()}, value=0, label=t('period')
             )
-            for element in (self._valve, self._kind, self._days):
-                element.props('dense outlined options-dense').classes('filter')
+            for select in (self._valve, self._kind, self._days):
+                select.props('dense outlined options-dense').classes('filter')
             for element in (self._text, self._valve, self._kind, self._days):
                 element.on_value_change(self._draw)
         with card(t('alarms'), classes='w-full'):
@@ -142,7 +142,7 @@ class _View:
             with_values(button(t('add_comment'), add, 'main'), aria_label=t('add_comment'))
 
 
-def _action(row: dict[str, Any], t: Texts) -> dict[str, str]:
+def _action(row: ActionRow, t: Texts) -> dict[str, str]:
     key = f'action_{row["action"]}'
     return {
         'moment': t.moment(int(row['seen'] * 1e9)),
@@ -161,9 +161,9 @@ def _export(watcher: Watcher, wanted: Wanted, t: Texts) -> None:
     table = csv.writer(stream)
     table.writerow(('kind', *COLUMNS, *(c for c in ACTION_COLUMNS if c not in COLUMNS)))
     for row in watcher.history.find(wanted, EXPORTED):
-        table.writerow(('event', *(cell(row[name]) for name in COLUMNS)))
-    for row in watcher.history.actions(wanted, EXPORTED):
-        common = (cell(row.get(name, '')) for name in COLUMNS)
-        rest = (cell(row[name]) for name in ACTION_COLUMNS if name not in COLUMNS)
+        table.writerow(('event', *(cell(row.get(name)) for name in COLUMNS)))
+    for done in watcher.history.actions(wanted, EXPORTED):
+        common = (cell(done.get(name, '')) for name in COLUMNS)
+        rest = (cell(done.get(name)) for name in ACTION_COLUMNS if name not in COLUMNS)
         table.writerow(('action', *common, *rest))
     ui.download.content(stream.getvalue().encode('utf-8-sig'), 'history.csv', 'text/csv')

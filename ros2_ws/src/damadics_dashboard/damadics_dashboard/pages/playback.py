@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """A recorded bag through the same estimator and detector as the live nodes, for the page."""
 
-from dataclasses import asdict, dataclass, field
+import math
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from damadics_fd.bag.errors import BagError
@@ -13,13 +13,14 @@ from damadics_fd.causes import load_causes
 from damadics_fd.commands.replay.bags import joined
 from damadics_fd.core.decision.events import Event
 from damadics_fd.core.monitor import monitor_for
+from damadics_fd.core.result import Result
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.stamps import SECOND as NANO
 from damadics_fd.figures.decimation import Thinner
-from numpy.typing import NDArray
 
 from damadics_dashboard.live.traces import Points, block_means, envelope
-from damadics_dashboard.pages.plots import BLOCK, SMALLEST
+from damadics_dashboard.pages.plots import BLOCK, SMALLEST, Area
+from damadics_dashboard.store.rows import EventRow
 
 INTERVALS = 1200  # across the plots of a whole recording
 RAISED, CLEARED = 0, 1
@@ -47,7 +48,7 @@ class Playback:
         """The alarms that were raised."""
         return [event for event in self.events if event.transition == RAISED]
 
-    def areas(self) -> list[Any]:
+    def areas(self) -> list[Area]:
         """Mark the time of every alarm, for a plot."""
         begin: float | None = None
         areas = []
@@ -61,13 +62,24 @@ class Playback:
             areas.append([{'xAxis': begin}, {'xAxis': self.range[1]}])
         return areas
 
-    def rows(self) -> list[dict[str, Any]]:
+    def rows(self) -> list[EventRow]:
         """Return the transitions as the history table takes them, newest last."""
-        rows = [{'valve': self.name, **asdict(event)} for event in self.events]
-        for row in rows:
-            if not np.isfinite(row['ratio']):
-                row['ratio'] = None
-        return rows
+        return [
+            EventRow(
+                valve=self.name,
+                stamp=event.stamp,
+                transition=event.transition,
+                occurrence=event.occurrence,
+                level=event.level,
+                ratio=event.ratio if math.isfinite(event.ratio) else None,
+                cause=event.cause,
+                confidence=event.confidence,
+                strength=event.strength,
+                text=event.text,
+                advice=event.advice,
+            )
+            for event in self.events
+        ]
 
 
 def play(path: Path, mode: str, name: str = '') -> list[Playback]:
@@ -107,7 +119,7 @@ def _play(recording: Recording, mode: str, name: str) -> Playback:
     return done
 
 
-def _draw(done: Playback, columns: dict[str, NDArray[Any]], result: Any, width: int) -> None:
+def _draw(done: Playback, columns: dict[str, np.ndarray], result: Result, width: int) -> None:
     stamp = np.asarray(columns['stamp'])
     order = np.argsort(stamp, kind='stable')
     stamp = stamp[order]

@@ -2,13 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """The plots of a valve, live and in replay: Apache ECharts fed with what is new."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TypeAlias, TypedDict
 
 import numpy as np
+from damadics_fd.core.record import Saved
 from damadics_fd.core.stamps import SECOND as NANO
 from nicegui import ui
-from numpy.typing import NDArray
 
 from damadics_dashboard.live.traces import Points, Trace, block_means, envelope
 from damadics_dashboard.pages.elements import box, tell, with_values
@@ -16,6 +17,35 @@ from damadics_dashboard.pages.elements import box, tell, with_values
 BUCKETS = 300  # intervals across a plot: two points each at most
 BLOCK = NANO // 10  # of the signature: means over 0.1 s cancel 50 and 60 Hz hum
 SMALLEST = 1e-5  # 1/s; a logarithmic axis has no zero
+
+Area: TypeAlias = list[dict[str, float]]  # {'xAxis': begin}, {'xAxis': end} [s]
+
+
+class Options(TypedDict, total=False):
+    """Options of a chart, as ECharts names them."""
+
+    animation: bool
+    grid: Saved
+    legend: Saved
+    tooltip: Saved
+    axisPointer: Saved
+    dataZoom: list[Saved]
+    xAxis: Saved
+    yAxis: Saved
+    series: list[Saved]
+
+
+News = TypedDict(  # what `damadics.push` takes for one chart; `from` is a word of Python
+    'News',
+    {
+        'all': bool,
+        'from': Sequence[float],
+        'series': Sequence[Points],
+        'range': Sequence[float],
+        'areas': list[Area],
+    },
+    total=False,
+)
 
 
 def time_plot(
@@ -27,7 +57,7 @@ def time_plot(
     high: float | None = None,
     dashed: tuple[str, ...] = (),
     bands: tuple[str, ...] = (),
-) -> dict[str, Any]:
+) -> Options:
     """
     Return the options of a plot over time that can be zoomed and moved.
 
@@ -40,7 +70,7 @@ def time_plot(
     :param bands: curves drawn thin, as the edges of a band.
     :return: ECharts options.
     """
-    axis: dict[str, Any] = {
+    axis: Saved = {
         'type': 'log' if log else 'value',
         'name': unit,
         'nameTextStyle': {'align': 'left'},
@@ -102,7 +132,7 @@ def time_plot(
     }
 
 
-def signature_plot(names: tuple[str, ...], x: str, y: str) -> dict[str, Any]:
+def signature_plot(names: tuple[str, ...], x: str, y: str) -> Options:
     """
     Return the options of the valve signature: force over position.
 
@@ -161,7 +191,7 @@ class Plot:
 
     def __init__(
         self,
-        options: dict[str, Any],
+        options: Options,
         colors: list[str],
         label: str,
         style: str = 'plot',
@@ -171,7 +201,7 @@ class Plot:
     ) -> None:
         xy = options['series'][0]['type'] == 'scatter'
         with box('div', 'plot-box'):
-            self.chart = ui.echart(options).classes(style)
+            self.chart = ui.echart(dict(options)).classes(style)
             with_values(self.chart, role='img', aria_label=label)
             if empty:
                 place = ui.label(empty).classes('plot-empty')
@@ -201,7 +231,7 @@ class Curve:
     scale: float = 1.0
     sent: int = -1  # start of the last interval sent [ns]
 
-    def points(self, rows: NDArray[Any], width: int) -> Points:
+    def points(self, rows: np.ndarray, width: int) -> Points:
         """Thin out the samples given."""
         if self.largest:
             values = np.maximum(rows[self.column], SMALLEST)
@@ -228,7 +258,7 @@ class Feed:
             curve.sent = -1
         self._end = -1
 
-    def news(self) -> dict[int, Any] | None:
+    def news(self) -> dict[int, News] | None:
         """
         Return what `damadics.push` needs.
 
@@ -249,7 +279,7 @@ class Feed:
         )
         begin = max(end - int(self.window * NANO), first)
         last = begin + int(self.window * NANO)
-        message: dict[int, Any] = {}
+        message: dict[int, News] = {}
         for plot, curves in self.curves.items():
             everything = any(c.sent < begin for c in curves)
             series, starts = [], []
@@ -295,4 +325,7 @@ def signature(trace: Trace, seconds: float) -> tuple[Points, Points]:
 
 
 def _rounded(points: Points) -> Points:
-    return [[round(t, 4), None if v is None else float(f'{v:.5g}')] for t, v in points]
+    return [
+        [None if t is None else round(t, 4), None if v is None else float(f'{v:.5g}')]
+        for t, v in points
+    ]

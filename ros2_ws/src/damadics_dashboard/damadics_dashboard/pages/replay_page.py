@@ -5,7 +5,7 @@
 import logging
 import tempfile
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from damadics_fd.core.text import COMMENT, NAME, plain
 from nicegui import events, run, ui
@@ -14,7 +14,7 @@ from damadics_dashboard.live.valve import NE107
 from damadics_dashboard.live.watcher import Watcher
 from damadics_dashboard.pages.elements import box, markup, tell, with_values
 from damadics_dashboard.pages.frame import card, frame
-from damadics_dashboard.pages.plots import Plot, signature_plot, time_plot
+from damadics_dashboard.pages.plots import News, Options, Plot, signature_plot, time_plot
 from damadics_dashboard.pages.valve_words import cause_of, history_rows
 from damadics_dashboard.server.limits import LARGEST_UPLOAD
 from damadics_dashboard.words.texts import Texts
@@ -91,7 +91,8 @@ async def _replayed(
         path = Path(folder, f'recording{suffix or ".mcap"}')
         try:
             await event.file.save(path)
-            return await run.io_bound(play, path, mode, plain(event.file.name, NAME))
+            done = await run.io_bound(play, path, mode, plain(event.file.name, NAME))
+            return done or []  # none where the page is closing
         except Exception as problem:  # a recording of somebody else must not hold up the page
             logging.getLogger(__name__).warning('replay failed: %r', problem)
             said = plain(str(problem).replace(folder, '').lstrip('/'), COMMENT)
@@ -121,12 +122,12 @@ def _show(done: 'Playback', mode: str, t: Texts) -> None:
     left_out = [t('left_out', what=plain(p, COMMENT)) for p in done.problems[:5]]
     detail = ' · '.join(plain(fact, COMMENT) for fact in (*facts, *left_out) if fact)
     markup('banner.html', kind=kind, title=verdict, detail=detail, figures=[]).classes('w-full')
-    message: dict[int, Any] = {}
+    message: dict[int, News] = {}
 
-    def plot(title: str, curves: dict[str, tuple[str, str]], **options: Any) -> int:
+    def plot(title: str, curves: dict[str, tuple[str, str]], options: Options) -> int:
         with card(t(title)):
             drawn = Plot(
-                time_plot(list(curves), **options),
+                options,
                 [color for _, color in curves.values()],
                 t(title),
                 group=f'replay{id(done)}',
@@ -142,19 +143,15 @@ def _show(done: 'Playback', mode: str, t: Texts) -> None:
             plot(
                 'position_title',
                 {cv: ('cv', '--cv'), x1: ('x1', '--x1')},
-                unit='1',
-                low=0.0,
-                high=1.0,
-                dashed=(cv,),
+                time_plot([cv, x1], '1', low=0.0, high=1.0, dashed=(cv,)),
             )
             judged = plot(
                 'residual_title',
                 {residual: ('residual', '--residual'), limit: ('threshold', '--rho')},
-                unit='1/s',
-                log=True,
-                dashed=(limit,),
+                time_plot([residual, limit], '1/s', log=True, dashed=(limit,)),
             )
-            plot('velocity_title', {t('velocity'): ('x2', '--velocity')}, unit='1/s')
+            velocity = t('velocity')
+            plot('velocity_title', {velocity: ('x2', '--velocity')}, time_plot([velocity], '1/s'))
         with box('div', 'stack'), card(t('signature_title'), t('signature_remark')):
             clouds = (t('before_alarm'), t('since_alarm')) if alarms else (t('whole_recording'),)
             cloud = Plot(

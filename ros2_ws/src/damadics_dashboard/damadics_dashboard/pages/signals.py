@@ -9,7 +9,7 @@ from nicegui import ui
 from damadics_dashboard.live.valve import Valve
 from damadics_dashboard.pages.elements import box, markup, redraw
 from damadics_dashboard.pages.frame import card
-from damadics_dashboard.pages.plots import Curve, Plot, signature_plot, time_plot
+from damadics_dashboard.pages.plots import Curve, Options, Plot, signature_plot, time_plot
 from damadics_dashboard.words.texts import Texts
 
 BAR = 1e-5  # bar per Pa
@@ -57,7 +57,7 @@ class Signals:
             cells.append((t(f'signal_{column}'), t.number(value, unit)))
         redraw(self._values, 'values.html', cells=cells)
 
-    def _plot(self, curves: list[Curve], options: dict, colors: list[str], label: str) -> Plot:
+    def _plot(self, curves: list[Curve], options: Options, colors: list[str], label: str) -> Plot:
         plot = Plot(options, colors, label, group=GROUP, empty=self._t('no_data_yet'))
         self.curves[plot.id] = curves
         return plot

@@ -3,7 +3,7 @@
 """The page of one valve: state, alarms, signals, signature, trends, history, simulator."""
 
 import time
-from typing import Any
+from typing import TypedDict
 from urllib.parse import unquote
 
 from damadics_fd.core.stamps import SECOND as NANO
@@ -16,7 +16,7 @@ from damadics_dashboard.pages.actions import valve_buttons
 from damadics_dashboard.pages.alarms import AlarmList
 from damadics_dashboard.pages.elements import box, markup, redraw, tell, with_values
 from damadics_dashboard.pages.frame import card, frame, may_operate
-from damadics_dashboard.pages.plots import Feed, signature
+from damadics_dashboard.pages.plots import Area, Feed, signature
 from damadics_dashboard.pages.report_button import report_button
 from damadics_dashboard.pages.signals import Signals
 from damadics_dashboard.pages.simulator import simulator_panel
@@ -33,6 +33,26 @@ PERIOD = 0.2  # s
 SIGNATURE_NOW = 30.0  # s
 WINDOWS = (10.0, 60.0, 600.0)  # s
 HISTORY = 30  # rows
+
+
+class Figure(TypedDict):
+    """One number of the banner."""
+
+    name: str
+    value: str
+    unit: str
+    aging: bool
+    share: float | None
+
+
+class Banner(TypedDict):
+    """What the banner shows."""
+
+    kind: str
+    title: str
+    detail: str
+    alarm: str
+    figures: list[Figure]
 
 
 def valve_page(watcher: Watcher, address: str, window: float = 60.0, days: str = '') -> None:
@@ -135,7 +155,7 @@ class _Page:
             news[self._signals.residual.id]['areas'] = self._areas()
             tell('push', news)
 
-    def _areas(self) -> list[Any]:
+    def _areas(self) -> list[Area]:
         """Mark the time of the present alarm."""
         alarm = self._valve.alarm()
         if alarm is None or not alarm.onset:
@@ -169,7 +189,7 @@ class _Page:
             if not self._paused:
                 self._draw_signature()
 
-    def _banner_values(self, condition: Condition, now: float, clock: int) -> dict[str, Any]:
+    def _banner_values(self, condition: Condition, now: float, clock: int) -> Banner:
         t, valve = self._t, self._valve
         alarm = valve.alarm()
         told = ''
@@ -218,5 +238,5 @@ def _figure(
     *,
     aging: bool = False,
     share: float | None = None,
-) -> dict[str, Any]:
+) -> Figure:
     return {'name': name, 'value': value, 'unit': unit, 'aging': aging, 'share': share}

@@ -5,7 +5,6 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 from urllib.parse import quote
 
 from damadics_fd.causes import Cause
@@ -14,6 +13,7 @@ from damadics_fd.core.text import SENTENCE, plain
 from damadics_msgs.msg import FaultEvent
 
 from damadics_dashboard.live.valve import NE107, Alarm, Condition, Valve
+from damadics_dashboard.store.rows import Cell, EventRow
 from damadics_dashboard.words.texts import Texts
 
 SHARED = ('', 'none')
@@ -96,7 +96,7 @@ def cause_of(name: str, t: Texts) -> Cause | None:
     return t.causes.causes.get(name) if name not in SHARED else None
 
 
-def headline(event: dict[str, Any], t: Texts) -> tuple[str, str, str]:
+def headline(event: EventRow, t: Texts) -> tuple[str, str, str]:
     """
     Say first what is wrong and how much, and what to do.
 
@@ -159,7 +159,7 @@ def alarm_words(valve: Valve, alarm: Alarm, t: Texts, *, name: bool) -> AlarmWor
     )
 
 
-def found_by(event: dict[str, Any], t: Texts) -> str:
+def found_by(event: EventRow, t: Texts) -> str:
     """
     Say who found a fault.
 
@@ -187,7 +187,7 @@ def alarm_kind(alarm: Alarm) -> str:
     return NE107.get(alarm.level, 'C') or 'M'
 
 
-def history_rows(rows: Sequence[dict[str, Any]], t: Texts) -> list[dict[str, Any]]:
+def history_rows(rows: Sequence[EventRow], t: Texts) -> list[dict[str, Cell]]:
     """
     Word transitions and actions for a table.
 
@@ -198,7 +198,7 @@ def history_rows(rows: Sequence[dict[str, Any]], t: Texts) -> list[dict[str, Any
     return [_row(row, t) for row in rows]
 
 
-def _row(row: dict[str, Any], t: Texts) -> dict[str, Any]:
+def _row(row: EventRow, t: Texts) -> dict[str, Cell]:
     transition = row['transition']
     what, numbers, advice = '', '', ''
     if transition in (FaultEvent.RAISED, FaultEvent.CHANGED):

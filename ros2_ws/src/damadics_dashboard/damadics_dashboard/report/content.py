@@ -5,13 +5,13 @@
 import math
 from collections import Counter
 from dataclasses import dataclass, field
-from typing import Any
 
 from damadics_fd.store.intervals import TRENDED, Intervals, Series
 from damadics_msgs.msg import FaultEvent
 
 from damadics_dashboard.pages.valve_words import TRANSITIONS, found_by, headline, of_limit
 from damadics_dashboard.store.history import History, Wanted
+from damadics_dashboard.store.rows import ActionRow, EventRow
 from damadics_dashboard.words.outlook import outlook_words, value_words
 from damadics_dashboard.words.texts import Texts
 
@@ -30,7 +30,7 @@ class Alarm:
     raised: float  # s
     cleared: float = math.nan
     level: int = 0
-    last: dict[str, Any] = field(default_factory=dict)  # the event that says most
+    last: EventRow = field(default_factory=EventRow)  # the event that says most
 
 
 @dataclass
@@ -44,7 +44,7 @@ class Report:
     tables: list[tuple[str, list[str], list[list[str]]]]
     trends: list[tuple[str, str, Series, tuple[float, ...]]]  # name, quantity, curve, limits
     footer: str
-    events: list[dict[str, Any]]
+    events: list[EventRow]
 
 
 class Sources:
@@ -68,7 +68,7 @@ class Sources:
         return sorted({*self.history.valves(), *self.intervals.valves()})
 
 
-def alarms_of(events: list[dict[str, Any]]) -> list[Alarm]:
+def alarms_of(events: list[EventRow]) -> list[Alarm]:
     """
     Put the transitions of a valve together.
 
@@ -183,7 +183,7 @@ def fleet_report(sources: Sources, since: float, until: float, t: Texts) -> Repo
     valves = sources.valves()
     rows: list[tuple[int, int, list[str]]] = []
     alarms: list[Alarm] = []
-    everything: list[dict[str, Any]] = []
+    everything: list[EventRow] = []
     for valve in valves:
         events = sources.history.find(Wanted(valve=valve, since=since, until=until), MOST_EVENTS)
         everything += events
@@ -227,7 +227,7 @@ def _heads(t: Texts) -> list[str]:
     return [t(k) for k in ('time', 'what', 'peak', 'text')]
 
 
-def _event(event: dict[str, Any], t: Texts) -> list[str]:
+def _event(event: EventRow, t: Texts) -> list[str]:
     what, numbers, advice = headline(event, t)
     told = event['transition'] in (FaultEvent.RAISED, FaultEvent.CHANGED)
     return [
@@ -238,7 +238,7 @@ def _event(event: dict[str, Any], t: Texts) -> list[str]:
     ]
 
 
-def _action(row: dict[str, Any], t: Texts) -> list[str]:
+def _action(row: ActionRow, t: Texts) -> list[str]:
     key = f'action_{row["action"]}'
     return [
         t.moment(int(row['seen'] * 1e9)),

@@ -58,7 +58,7 @@ def text_csv(report: Report) -> str:
     table = csv.writer(stream)
     table.writerow(COLUMNS)
     for event in report.events:
-        table.writerow([cell(event[name]) for name in COLUMNS])
+        table.writerow([cell(event.get(name)) for name in COLUMNS])
     return stream.getvalue()
 
 
@@ -95,7 +95,8 @@ def _chart(
     x = ((start - start[0]) / span).tolist()
 
     def y(values: NDArray[np.float64]) -> list[float]:
-        return ((values - low) / (high - low)).tolist()
+        shares: list[float] = ((values - low) / (high - low)).tolist()
+        return shares
 
     upper = list(zip(x, y(greatest), strict=True))
     lower = list(zip(x, y(least), strict=True))

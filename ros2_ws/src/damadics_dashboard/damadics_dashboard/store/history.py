@@ -6,12 +6,14 @@ import sqlite3
 import threading
 import time
 from collections import Counter, deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TypeVar
 
 from damadics_fd.store.databases import open_database
+
+from damadics_dashboard.store.rows import ActionRow, EventRow
 
 EVENT = {
     'valve': 'TEXT',
@@ -51,7 +53,7 @@ IDENTITY = ('valve', 'stamp', 'transition', 'occurrence', 'text')
 ACTION_IDENTITY = ('valve', 'action', 'user', 'comment', 'done')
 MOST_REPEATED = 20_000  # transitions of 200 valves
 MOST_WAITING = 10_000  # rows kept in memory while the file cannot be written
-Row = dict[str, Any]
+Row = TypeVar('Row', EventRow, ActionRow)
 
 
 @dataclass(frozen=True)
@@ -78,7 +80,7 @@ class History:
     def __init__(self, path: Path) -> None:
         self._lock = threading.Lock()
         self._db, self.problem = open_database(path, {'event': EVENT, 'action': ACTION}, INDEXES)
-        self._waiting: deque[tuple[str, Row]] = deque(maxlen=MOST_WAITING)
+        self._waiting: deque[tuple[str, EventRow | ActionRow]] = deque(maxlen=MOST_WAITING)
         # A detector repeats its last events to a newcomer, such as this page after its restart.
         self._known = Counter(
             tuple(row)
@@ -95,28 +97,28 @@ class History:
             )
         )
 
-    def add(self, event: Mapping[str, Any]) -> bool:
+    def add(self, event: EventRow) -> bool:
         """
         Add a transition, unless it repeats one from before this start.
 
         :param event: values by the names in `COLUMNS`, but for `seen`.
         :return: whether it is new.
         """
-        key = tuple(event[name] for name in IDENTITY)
+        key = tuple(event.get(name) for name in IDENTITY)
         if self._known[key]:
             self._known[key] -= 1
             return False
         self._write('event', {**event, 'seen': time.time()})
         return True
 
-    def add_action(self, action: Mapping[str, Any]) -> bool:
+    def add_action(self, action: ActionRow) -> bool:
         """
         Add what a person did, unless it is known: the node tells what the page asked it for.
 
         :param action: values by the names in `ACTION_COLUMNS`, but for `seen`.
         :return: whether it is new.
         """
-        key = tuple(action[name] for name in ACTION_IDENTITY)
+        key = tuple(action.get(name) for name in ACTION_IDENTITY)
         if self._known_actions[key]:
             self._known_actions[key] -= 1
             return False
@@ -134,7 +136,7 @@ class History:
         if self.problem.startswith('not written'):
             self.problem = ''
 
-    def latest(self, valve: str | None = None, count: int = 200) -> list[Row]:
+    def latest(self, valve: str | None = None, count: int = 200) -> list[EventRow]:
         """
         Return the latest transitions, newest first.
 
@@ -144,7 +146,7 @@ class History:
         """
         return self.find(Wanted(valve=valve), count)
 
-    def find(self, wanted: Wanted, count: int = 200, offset: int = 0) -> list[Row]:
+    def find(self, wanted: Wanted, count: int = 200, offset: int = 0) -> list[EventRow]:
         """
         Return the transitions that are looked for, newest first.
 
@@ -157,11 +159,11 @@ class History:
         if wanted.transitions:
             where += f' AND transition IN ({", ".join("?" * len(wanted.transitions))})'
             values += wanted.transitions
-        return self._select('event', COLUMNS, where, values, count, offset)
+        return self._select(EventRow, 'event', COLUMNS, where, values, count, offset)
 
     def actions(
         self, wanted: Wanted | None = None, count: int = 200, offset: int = 0
-    ) -> list[Row]:
+    ) -> list[ActionRow]:
         """
         Return what people did, newest first.
 
@@ -173,7 +175,7 @@ class History:
         where, values = _where(
             wanted or Wanted(), ('valve', 'user', 'comment', 'result', 'action')
         )
-        return self._select('action', ACTION_COLUMNS, where, values, count, offset)
+        return self._select(ActionRow, 'action', ACTION_COLUMNS, where, values, count, offset)
 
     def valves(self) -> list[str]:
         """
@@ -191,11 +193,11 @@ class History:
         with self._lock:
             self._db.close()
 
-    def _write(self, table: str, row: Row) -> None:
+    def _write(self, table: str, row: EventRow | ActionRow) -> None:
         if self._waiting or not self._insert(table, row):
             self._waiting.append((table, row))
 
-    def _insert(self, table: str, row: Row) -> bool:
+    def _insert(self, table: str, row: EventRow | ActionRow) -> bool:
         columns = COLUMNS if table == 'event' else ACTION_COLUMNS
         marks = ', '.join(f':{name}' for name in columns)
         try:
@@ -210,10 +212,11 @@ class History:
 
     def _select(
         self,
+        kind: type[Row],
         table: str,
         columns: Sequence[str],
         where: str,
-        values: tuple[Any, ...],
+        values: tuple[str | float, ...],
         count: int,
         offset: int,
     ) -> list[Row]:
@@ -223,14 +226,14 @@ class History:
         )
         try:
             with self._lock:
-                rows = self._db.execute(query, (*values, count, offset)).fetchall()
+                found = self._db.execute(query, (*values, count, offset)).fetchall()
         except sqlite3.Error as problem:
             self.problem = f'not read: {problem}'
             return []
-        return [dict(zip(columns, row, strict=True)) for row in rows]
+        return [kind(**dict(zip(columns, row, strict=True))) for row in found]
 
 
-def _where(wanted: Wanted, columns: Sequence[str]) -> tuple[str, tuple[Any, ...]]:
+def _where(wanted: Wanted, columns: Sequence[str]) -> tuple[str, tuple[str | float, ...]]:
     where = 'seen >= ? AND seen < ?'
     values: tuple[str | float, ...] = (wanted.since, wanted.until)
     if wanted.valve is not None:

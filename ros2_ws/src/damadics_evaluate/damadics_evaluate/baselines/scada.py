@@ -77,7 +77,8 @@ class Scada(Detector):
         """
         state = self.monitor.state
         kept = min(int(state.samples), SIGNATURE_S)
-        rows = state.history[np.arange(state.samples - kept, state.samples) % HISTORY_LENGTH]
+        last = np.arange(state.samples - kept, state.samples) % HISTORY_LENGTH
+        rows = np.asarray(state.history)[last]
         direction = np.sign(rows['cv'] - rows['cv0'])
         position = (rows['xm'] - 0.5) / 0.18
         m1, g1, d1 = _regress(rows['r1'], position, direction)

@@ -178,7 +178,7 @@ class MessageFile(ABC):
         words = kernels.words(data)
         n, k, end = kernels.index(words, len(data), channels, starts, sizes, others)
         for place in others[:k].tolist():
-            op, length = HEAD.unpack_from(data, place)
+            op, length = HEAD.unpack_from(data.data, place)
             content = data[place + HEAD.size : place + HEAD.size + length].tobytes()
             try:
                 self.note_record(Op(op), content)

@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from damadics_fd.bag.cdr.decoder import Columns
 from damadics_fd.bag.cdr.definition import full_name
@@ -151,7 +150,7 @@ class Recording:
         return 'log_time'
 
 
-def hold(stamp: NDArray, values: NDArray, at: NDArray) -> NDArray:
+def hold(stamp: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.ndarray:
     """
     Return the latest value at each instant, NaN before the first.
 

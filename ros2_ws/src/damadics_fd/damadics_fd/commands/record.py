@@ -126,7 +126,7 @@ def _spin(node: Recorder, spool: Spool, stop: list[int]) -> None:
     executor = EventsExecutor()
     executor.add_node(node)
     spin_until(lambda: bool(stop), executor, [node])
-    never: Future = Future()
+    never: Future[None] = Future()
     end = time.monotonic() + LAST_WAIT
     received = -1
     while received != spool.received and time.monotonic() < end:

@@ -4,15 +4,16 @@
 
 from collections.abc import Iterator
 from dataclasses import Field, dataclass, field, fields
-from typing import ClassVar
+from typing import ClassVar, TypeAlias
 
 import numpy as np
 
 from damadics_fd.core.modes import MODES
-from damadics_fd.core.record import Array
+from damadics_fd.core.record import Array, Plain
 
 KINDS: dict[type, str] = {bool: '?', int: 'i8', float: 'f8', tuple: 'f8'}
 Value = str | bool | int | float | tuple[float, ...]
+Given: TypeAlias = Plain | tuple[float, ...]  # for a setting, not checked yet
 APPROXIMATOR = ('paper', 'monitor')  # the modes with the on-line approximator
 
 
@@ -215,7 +216,7 @@ def _numbers(kind: type[Section]) -> Iterator[str]:
         yield from vars(base).get('DERIVED', ())
 
 
-def wrong_choice(name: str, value: Value, options: tuple[str, ...]) -> str:
+def wrong_choice(name: str, value: Given, options: tuple[str, ...]) -> str:
     """
     Say that a value is none of the options.
 

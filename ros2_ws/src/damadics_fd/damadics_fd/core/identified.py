@@ -5,7 +5,9 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from damadics_fd.core.record import Floats, Ints, Plain
+import numpy as np
+
+from damadics_fd.core.record import Plain
 
 OK, LIMITED, REFUSED = 'ok', 'limited', 'refused'
 VERDICTS = (OK, LIMITED, REFUSED)
@@ -27,4 +29,4 @@ class FaultFree:
     """Hold one fault-free recording as `commission` hands it to `identify` of a mode."""
 
     name: str
-    columns: Mapping[str, Floats | Ints]  # `stamp` [ns] and the signals by name, NaN: not measured
+    columns: Mapping[str, np.ndarray]  # `stamp` [ns] and the signals by name, NaN: not measured

@@ -62,7 +62,7 @@ NAMES = {
 }
 
 
-def envelope(t: NDArray, y: NDArray, points: int = POINTS) -> tuple[NDArray, NDArray]:
+def envelope(t: np.ndarray, y: np.ndarray, points: int = POINTS) -> tuple[np.ndarray, np.ndarray]:
     """
     Thin out a curve without losing its spikes: keep the extremes of each interval.
 
@@ -89,7 +89,7 @@ def envelope(t: NDArray, y: NDArray, points: int = POINTS) -> tuple[NDArray, NDA
 
 def six_panels(
     result: Result,
-    columns: Mapping[str, NDArray],
+    columns: Mapping[str, np.ndarray],
     path: str | Path,
     title: str = '',
 ) -> Path:
@@ -146,8 +146,8 @@ def six_panels(
 
 def _error(
     axis: Any,
-    t: NDArray,
-    error: NDArray,
+    t: np.ndarray,
+    error: np.ndarray,
     armed: NDArray[np.bool_],
     title: str,
     unit: str,
@@ -170,7 +170,7 @@ def _error(
     axis.set_title(f'{title}  [{unit}]')
 
 
-def _learning(axis: Any, t: NDArray, armed: NDArray[np.bool_], text: str) -> None:
+def _learning(axis: Any, t: np.ndarray, armed: NDArray[np.bool_], text: str) -> None:
     """Shade the time before the first decision."""
     first = int(armed.argmax()) if armed.any() else len(t) - 1
     if first > 0:
@@ -178,7 +178,7 @@ def _learning(axis: Any, t: NDArray, armed: NDArray[np.bool_], text: str) -> Non
         axis.text(0.5 * (t[0] + t[first]), 0.35, text, color=GREY, ha='center', clip_on=True)
 
 
-def _residual(axis: Any, t: NDArray, decisions: NDArray) -> None:
+def _residual(axis: Any, t: np.ndarray, decisions: np.ndarray) -> None:
     residual, rho = decisions['residual'], decisions['threshold']
     axis.plot(*envelope(t, residual), color=BLUE, label=r'residual $|\xi_2|$')
     axis.plot(*envelope(t, rho), color=ORANGE, linewidth=1.8, label=r'threshold $\rho$')
@@ -191,7 +191,7 @@ def _residual(axis: Any, t: NDArray, decisions: NDArray) -> None:
     axis.set_title(r'residual $|\xi_2|$ and threshold $\rho$  [stroke/s]')
 
 
-def _strength(axis: Any, t: NDArray, columns: Mapping[str, NDArray]) -> float | None:
+def _strength(axis: Any, t: np.ndarray, columns: Mapping[str, np.ndarray]) -> float | None:
     """Draw the truth; return the onset of the fault [s], None where there is none."""
     axis.set_title('fault strength (truth)')
     axis.set_ylim(-0.05, 1.1)
@@ -231,7 +231,7 @@ def _strength(axis: Any, t: NDArray, columns: Mapping[str, NDArray]) -> float | 
     return onset
 
 
-def _decision(axis: Any, t: NDArray, result: Result, zero: int, onset: float | None) -> None:
+def _decision(axis: Any, t: np.ndarray, result: Result, zero: int, onset: float | None) -> None:
     fault = result.decisions['fault'].astype(float)
     when, flag = envelope(t, fault)
     counts = when >= (t[0] if onset is None else onset)
@@ -265,7 +265,7 @@ def _decision(axis: Any, t: NDArray, result: Result, zero: int, onset: float | N
         axis.text(0.5, 0.6, 'no fault flagged', color=GREY, ha='center', transform=axis.transAxes)
 
 
-def _valve(axis: Any, t: NDArray, columns: Mapping[str, NDArray]) -> None:
+def _valve(axis: Any, t: np.ndarray, columns: Mapping[str, np.ndarray]) -> None:
     axis.plot(*envelope(t, columns['cv']), color=GREY, linewidth=1.2, label='CV')
     axis.plot(*envelope(t, columns['x1']), color=BLUE, linewidth=1.5, label='X')
     axis.set_ylim(-0.05, 1.3)

@@ -41,11 +41,11 @@ class ForceMap:
 
     def __init__(self, signature: Signature) -> None:
         self._signature = signature
-        self._rest: NDArray[Any] | None = None
+        self._rest: np.ndarray | None = None
         self._blocks: list[Array] = []
         self._count = 0
 
-    def add(self, estimates: NDArray[Any]) -> None:
+    def add(self, estimates: np.ndarray) -> None:
         """
         Take the next accepted rows.
 

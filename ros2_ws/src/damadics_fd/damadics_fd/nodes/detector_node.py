@@ -119,7 +119,11 @@ class DetectorNode(MonitoringNode):
 
     def _join(self, heard: Callable[[Estimate, str], None]) -> None:
         """Take estimates of an estimator in this process directly; errors as from a topic."""
-        contained = self.entities.contained('estimate', lambda found: heard(*found))
+
+        def take(found: tuple[Estimate, str]) -> None:
+            heard(*found)
+
+        contained = self.entities.contained('estimate', take)
         self._taker = Taker(lambda estimate, tag: contained((estimate, tag)))
         takers = self._joints.at(self.resolve_topic_name('estimate')).takers
         takers.append(self._taker)

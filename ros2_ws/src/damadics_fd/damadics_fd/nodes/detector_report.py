@@ -3,7 +3,8 @@
 """What a detector tells of itself in the diagnostics."""
 
 from damadics_fd.core.decision.alarm import NE107, STATE_UNKNOWN
-from damadics_fd.core.decision.detector import Decision, Detector
+from damadics_fd.core.decision.detector import Detector
+from damadics_fd.core.decision.events import Decision
 from damadics_fd.nodes.alarm_memory import AlarmMemory
 from damadics_fd.nodes.signature_publisher import SignaturePublisher
 from damadics_fd.ros.diagnostics import Level, Report

@@ -64,7 +64,7 @@ class InputWatch:
         self._command = command
         self._slow = PERIODS * period
         self._clock = node.get_clock()
-        self._simulated = node.get_parameter('use_sim_time').value
+        self._simulated = bool(node.get_parameter('use_sim_time').value)
         self._wall: float | None = None  # monotonic time of the last message [s]
         self._ros = 0  # ROS time of the last message [ns]
         self._ros_seen = 0

@@ -18,7 +18,7 @@ from damadics_fd.ros.diagnostics import Diagnostics, Level, Report
 from damadics_fd.ros.entities import Entities
 from damadics_fd.ros.parameter_files import files_of, says_nothing
 from damadics_fd.ros.parameters import Parameters, declare_settings
-from damadics_fd.ros.spin import StartError
+from damadics_fd.ros.spin import SpinnableNode, StartError
 from damadics_fd.store.slots import check_folder
 
 TIMEOUT_LIMITS = (0.01, 3600.0)
@@ -26,7 +26,7 @@ LATE = 1.0  # s that a sample may be behind or ahead of the clock without a word
 DONE = TransitionCallbackReturn.SUCCESS
 
 
-class MonitoringNode(LifecycleNode, ABC):
+class MonitoringNode(LifecycleNode, SpinnableNode, ABC):
     """
     A lifecycle node with one watched input.
 

@@ -11,7 +11,7 @@ from rclpy.node import Node
 from std_msgs.msg import Header
 
 from damadics_fd.causes import CauseTable, CauseTableError, load_causes
-from damadics_fd.core.record import Array, Saved
+from damadics_fd.core.record import Array, Ints, Saved
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.signature.cause import own_alarm_ready
 from damadics_fd.core.signature.signature import Signature
@@ -83,8 +83,8 @@ class SignaturePublisher:
         self._saved: Saved = {}
         self.problem = ''  # why signature or trend are not kept
         self._state: Array | None = None
-        self._news: list[Array] = []
-        self._last: tuple[int, ...] = ()
+        self._news: list[Ints] = []
+        self._last: list[int] = []
         self._next = 0
         self._publisher = entities.publisher(SignatureMessage, 'signature', qos.FLAG)
 
@@ -139,7 +139,7 @@ class SignaturePublisher:
         state = self._signature.state
         if state is not self._state:  # views of its fields: a record is slow to ask
             self._state, self._news = state, [state[name] for name in ('state', 'family', 'cause')]
-        present = tuple(field.item() for field in self._news)
+        present = [int(field.item()) for field in self._news]
         if present == self._last and self._next - PERIOD <= stamp < self._next:
             return
         s = state[0]

@@ -29,7 +29,7 @@ def nanoseconds(time: Time) -> int:
     :param time: stamp of a message.
     :return: the stamp [ns].
     """
-    return time.sec * SECOND + time.nanosec
+    return int(time.sec) * SECOND + int(time.nanosec)
 
 
 def set_stamp(time: Time, stamp: int) -> None:

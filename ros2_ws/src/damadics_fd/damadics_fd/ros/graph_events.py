@@ -58,7 +58,7 @@ class GraphEvents:
         self._thread.start()
 
     def _function(self, name: str, result: type) -> 'ctypes._NamedFuncPointer':
-        function = getattr(self._rcl, name)
+        function: ctypes._NamedFuncPointer = getattr(self._rcl, name)
         function.restype = result
         return function
 

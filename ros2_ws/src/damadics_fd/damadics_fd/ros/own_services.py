@@ -7,7 +7,6 @@ from typing import TypeVar
 
 from lifecycle_msgs.srv import ChangeState
 from rclpy.node import Node
-from rclpy.service import Service
 
 Request = TypeVar('Request')
 Response = TypeVar('Response')
@@ -23,13 +22,12 @@ def contain(node: Node) -> None:
     :param node: its services so far: parameters, type description, lifecycle.
     """
     for service in node.services:
-        service.callback = _contained(node, service)
+        service.callback = _contained(node, service.srv_name, service.callback)
 
 
-def _contained(node: Node, service: Service) -> Callable[[Request, Response], Response]:
-    serve = service.callback
-    name = service.srv_name
-
+def _contained(
+    node: Node, name: str, serve: Callable[[Request, Response], Response]
+) -> Callable[[Request, Response], Response]:
     def served(request: Request, response: Response) -> Response:
         try:
             return serve(request, response)

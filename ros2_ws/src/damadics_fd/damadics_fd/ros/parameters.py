@@ -2,13 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Declare a node's parameters so that all mistakes in them are reported together."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 
 from damadics_fd.core.modes import MODES
 from damadics_fd.core.settings import Settings, SettingsError, unread
@@ -117,7 +118,7 @@ class Parameters:
     def _refuse(self, name: str, cause: str, description: str) -> None:
         self._problems.append(f'{name}: {cause} ({description})')
 
-    def _given(self) -> dict[str, Any]:
+    def _given(self) -> Mapping[str, Parameter]:
         # rclpy has no public view of the overrides of parameters that are not declared
         return self._node._parameter_overrides
 

@@ -7,7 +7,6 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol
 
 import rclpy
 from rclpy.clock import Clock, ClockType
@@ -16,6 +15,7 @@ from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.executors import ExternalShutdownException
 from rclpy.experimental import EventsExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation as rcl
+from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
@@ -29,14 +29,11 @@ LEAVING = 5.0  # s that they may need where a signal ends the process
 LONG = 3600.0  # s; a call costs 30 bytes that rclpy never frees
 
 
-class SpinnableNode(Protocol):
-    """What `spin` needs of a node beside what every node has."""
+class SpinnableNode(Node):
+    """A node that says when it has finished, and how."""
 
     finished: bool
     exit_code: int
-
-    def destroy_node(self) -> None:
-        """Release what the node holds."""
 
 
 class StartError(Exception):
@@ -51,7 +48,7 @@ class UsageError(StartError):
     exit_code = 2
 
 
-def spin_until(done: Callable[[], bool], executor: EventsExecutor, nodes: Sequence[Any]) -> None:
+def spin_until(done: Callable[[], bool], executor: EventsExecutor, nodes: Sequence[Node]) -> None:
     """
     Let nodes work until there is a reason to end.
 
@@ -62,10 +59,13 @@ def spin_until(done: Callable[[], bool], executor: EventsExecutor, nodes: Sequen
     steady = Clock(clock_type=ClockType.STEADY_TIME)
     with timers_kept_going(nodes):
         while not done():
-            ended: Future = Future()
-            timer = nodes[0].create_timer(
-                LOOK, lambda ended=ended: ended.set_result(None) if done() else None, clock=steady
-            )
+            ended: Future[None] = Future()
+
+            def look(ended: 'Future[None]' = ended) -> None:
+                if done():
+                    ended.set_result(None)
+
+            timer = nodes[0].create_timer(LOOK, look, clock=steady)
             try:
                 # Never untimed: an untimed spin of this executor does not return in some builds.
                 # Many callbacks a call, where spin_once returns after each.
@@ -78,7 +78,7 @@ def spin_until(done: Callable[[], bool], executor: EventsExecutor, nodes: Sequen
             nodes[0].destroy_timer(timer)
 
 
-def let_subscribers_take(nodes: Sequence[Any], patience: float) -> bool:
+def let_subscribers_take(nodes: Sequence[Node], patience: float) -> bool:
     """
     Wait until the reliable subscribers of nodes have what was published: it goes with the nodes.
 

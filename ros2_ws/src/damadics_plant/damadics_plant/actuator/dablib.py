@@ -56,7 +56,7 @@ STATE_DTYPE = np.dtype(
 )
 
 
-def initial_state(a: Actuator) -> 'np.ndarray[Any, np.dtype[Any]]':
+def initial_state(a: Actuator) -> np.ndarray:
     """
     Return the state at scenario zero: valve open and at rest, chamber vented.
 

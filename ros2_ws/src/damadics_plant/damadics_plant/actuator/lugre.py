@@ -52,7 +52,7 @@ STATE_DTYPE = np.dtype(
 )
 
 
-def initial_state(a: LuGreActuator) -> 'np.ndarray[Any, np.dtype[Any]]':
+def initial_state(a: LuGreActuator) -> np.ndarray:
     """
     Return the state at scenario zero: valve open and at rest, chamber vented.
 

@@ -3,7 +3,7 @@
 """Constants of the DAMADICS actuator (DABLib v1.22) and of its LuGre variant, in one place."""
 
 from dataclasses import dataclass, fields
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from damadics_fd.core.sample import TABLE
@@ -70,7 +70,7 @@ class Actuator:
     plug_diameter: float = 1000.0 * VALVE.plug_diameter
     """Diameter of the plug d [mm]."""
 
-    def record(self) -> 'np.ndarray[Any, np.dtype[Any]]':
+    def record(self) -> np.ndarray:
         """
         Return the constants as a structured array of length 1 for compiled code.
 

@@ -36,7 +36,7 @@ def valve_flow(
     """
     drop = effective_drop(recovery(KM, xr), p1, p2, pv)
     kvr = inherent(xr, EXPONENT) * e.kv_factor + e.kv_offset
-    flow = mass_flow(a.valve_coefficient * kvr, drop, density) * e.flow_factor
+    flow: float = mass_flow(a.valve_coefficient * kvr, drop, density) * e.flow_factor
     if e.bypass > 0.0:
         km = interpolate(1.0 - e.bypass, BYPASS_POSITION, BYPASS_KM)
         flow += bypass_flow(a.bypass_coefficient, e.bypass, effective_drop(km, p1, p2, pv))

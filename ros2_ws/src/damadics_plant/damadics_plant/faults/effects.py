@@ -32,7 +32,7 @@ FAULT_DTYPE = np.dtype(
 )
 
 
-def fault_table(faults: Sequence[Fault]) -> 'np.ndarray[Any, np.dtype[Any]]':
+def fault_table(faults: Sequence[Fault]) -> np.ndarray:
     """
     Lay faults out for compiled code.
 

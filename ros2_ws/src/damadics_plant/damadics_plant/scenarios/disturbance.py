@@ -52,7 +52,8 @@ class Disturbance:
         :return: share of the range, shape (n,).
         """
         ticks = np.arange(first, first + n * every, every)
-        return HUM * np.sin(2 * np.pi * np.mod(50.0 * ticks / rate, 1.0))
+        hum: np.ndarray = HUM * np.sin(2 * np.pi * np.mod(50.0 * ticks / rate, 1.0))
+        return hum
 
     def disturb(self, name: str, values: np.ndarray, every: int, hum: np.ndarray) -> np.ndarray:
         """

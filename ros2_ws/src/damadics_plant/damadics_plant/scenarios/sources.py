@@ -145,6 +145,8 @@ class Recorded:
     def at(self, t: np.ndarray) -> np.ndarray:
         """Evaluate, see `Source`; constant beyond both ends."""
         if self.interpolate:
-            return np.interp(t, self.times, self.values)
+            between: np.ndarray = np.interp(t, self.times, self.values)
+            return between
         index = np.searchsorted(self.times, t, side='right') - 1
-        return self.values[np.maximum(index, 0)]
+        held: np.ndarray = self.values[np.maximum(index, 0)]
+        return held

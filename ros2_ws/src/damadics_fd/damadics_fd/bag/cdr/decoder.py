@@ -4,7 +4,6 @@
 
 import re
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +16,7 @@ from damadics_fd.bag.cdr.layout import Layout, Place, layout_of
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.messages import Batch, MessageFile
 
-Columns = dict[str, NDArray[Any]]
+Columns = dict[str, np.ndarray]
 MOST_LAYOUTS = 64  # in one chunk, that are looked for by column
 MOST_PLACES = 1 << 17  # of the layouts that are remembered
 _ELEMENT = re.compile(r'\.\d+(\.|$)')  # a member of a sequence of messages: no column
@@ -61,7 +60,7 @@ class Decoder:
             name: np.empty(0, np.int64) for name in ('stamp', 'log_time')
         }
 
-    def decode(self, batch: Batch, starts: NDArray, sizes: NDArray) -> Columns:
+    def decode(self, batch: Batch, starts: np.ndarray, sizes: np.ndarray) -> Columns:
         """
         Decode messages of this channel.
 
@@ -72,7 +71,7 @@ class Decoder:
         :raises BagError: where a message does not follow its definition or lacks a field.
         """
         left = np.ones(len(starts), bool)
-        groups: list[tuple[NDArray, Columns]] = []
+        groups: list[tuple[np.ndarray, Columns]] = []
         while left.any():
             first = int(left.argmax())
             layout = self._layout(batch.data[starts[first] : starts[first] + sizes[first]])
@@ -151,7 +150,7 @@ class Decoder:
             self._layouts.pop(0)
         return layout
 
-    def _columns(self, words: Words, starts: NDArray, layout: Layout) -> Columns:
+    def _columns(self, words: Words, starts: np.ndarray, layout: Layout) -> Columns:
         return {
             name: _time(words, starts + place, layout.order)
             if isinstance(place, int)
@@ -188,24 +187,25 @@ class Decoder:
         return {name: found[name] for name in chosen if name != 'log_time'}
 
 
-def same_layout(words: Words, starts: NDArray, layout: Layout) -> NDArray[np.bool_]:
+def same_layout(words: Words, starts: np.ndarray, layout: Layout) -> NDArray[np.bool_]:
     """Tell which messages have their fields at the places of a layout."""
-    same = words.w2[starts] == (0x0100 if layout.order == '<' else 0)
+    same: NDArray[np.bool_] = words.w2[starts] == (0x0100 if layout.order == '<' else 0)
     for offset, value in layout.lengths:
         same &= _ordered(words.w4[starts + offset], layout.order) == value
     return same
 
 
-def _ordered(values: NDArray, order: str) -> NDArray:
+def _ordered(values: np.ndarray, order: str) -> np.ndarray:
     return values if order == '<' else values.byteswap()
 
 
-def _time(words: Words, at: NDArray, order: str) -> NDArray[np.int64]:
+def _time(words: Words, at: np.ndarray, order: str) -> NDArray[np.int64]:
     seconds = _ordered(words.w4[at], order).view(np.int32)
-    return seconds * np.int64(10**9) + _ordered(words.w4[at + 4], order)
+    time: NDArray[np.int64] = seconds * np.int64(10**9) + _ordered(words.w4[at + 4], order)
+    return time
 
 
-def _field(words: Words, starts: NDArray, place: Place, order: str) -> NDArray:
+def _field(words: Words, starts: np.ndarray, place: Place, order: str) -> np.ndarray:
     """Gather any field: numbers, arrays, strings."""
     if place.text and place.dtype == 'u4':
         return _wide(words, starts, place, order)
@@ -218,14 +218,14 @@ def _field(words: Words, starts: NDArray, place: Place, order: str) -> NDArray:
             'replace',
         )
     size = int(place.dtype[1])
-    source: NDArray[Any] = words[(1, 2, 4, 8).index(size)]
+    source: np.ndarray = words[(1, 2, 4, 8).index(size)]
     if place.repeat is None:
         return _ordered(source[starts + place.offset], order).view(place.dtype)
     at = starts[:, None] + (place.offset + size * np.arange(place.repeat))
     return _ordered(source[at], order).view(place.dtype)
 
 
-def _wide(words: Words, starts: NDArray, place: Place, order: str) -> NDArray:
+def _wide(words: Words, starts: np.ndarray, place: Place, order: str) -> np.ndarray:
     """Gather a wstring, whose units of UTF-16 take four bytes each."""
     count = place.repeat or 0
     if not count:
@@ -235,21 +235,21 @@ def _wide(words: Words, starts: NDArray, place: Place, order: str) -> NDArray:
     return np.array(texts, 'U')
 
 
-def _merge(groups: list[tuple[NDArray, Columns]]) -> Columns:
+def _merge(groups: list[tuple[np.ndarray, Columns]]) -> Columns:
     """Put the messages of several layouts back in order."""
     order = np.argsort(np.concatenate([np.flatnonzero(rows) for rows, _ in groups]))
     names = [name for name in groups[0][1] if all(name in part for _, part in groups)]
     return {name: join([part[name] for _, part in groups])[order] for name in names}
 
 
-def join(arrays: list[NDArray]) -> NDArray:
+def join(arrays: list[np.ndarray]) -> np.ndarray:
     """Put the pieces of a column together; rows of changing length become objects."""
     if len({array.shape[1:] for array in arrays}) > 1:
         arrays = [_rows(array) for array in arrays]
     return np.concatenate(arrays)
 
 
-def _rows(array: NDArray) -> NDArray:
+def _rows(array: np.ndarray) -> np.ndarray:
     rows = np.empty(len(array), object)
     rows[:] = list(array)
     return rows

@@ -3,7 +3,7 @@
 """Messages that all have their fields at the same places, decoded in one pass over a chunk."""
 
 from collections.abc import Iterable, Mapping
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,7 +76,7 @@ class Alike:
             )
         )
 
-    def columns(self, block: NDArray[np.uint64]) -> dict[str, NDArray[Any]]:
+    def columns(self, block: NDArray[np.uint64]) -> dict[str, np.ndarray]:
         """View a block as columns."""
         return {name: block[row].view(kind) for row, (name, kind) in enumerate(self.kinds.items())}
 
@@ -98,7 +98,7 @@ def first_message(data: NDArray[np.uint8], number: int) -> tuple[int, int] | Non
     for _ in range(FIRST):
         if at + MESSAGE.size > len(data):
             break
-        op, length, channel, *_ = MESSAGE.unpack_from(data, at)
+        op, length, channel, *_ = MESSAGE.unpack_from(data.data, at)
         if op == Op.MESSAGE and channel == number:
             return at + MESSAGE.size, length + HEAD.size - MESSAGE.size
         at += HEAD.size + length

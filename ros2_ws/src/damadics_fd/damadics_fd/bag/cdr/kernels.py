@@ -51,7 +51,12 @@ def words(data: NDArray[np.uint8]) -> Words:
 
 @jit
 def index(
-    words: Words, end: int, channels: NDArray, starts: NDArray, sizes: NDArray, others: NDArray
+    words: Words,
+    end: int,
+    channels: np.ndarray,
+    starts: np.ndarray,
+    sizes: np.ndarray,
+    others: np.ndarray,
 ) -> tuple[int, int, int]:
     """
     Walk the records of a chunk by their heads.
@@ -76,14 +81,14 @@ def index(
                 break
             channels[n] = words.w2[at + CHANNEL_AT]
             starts[n] = at + BODY_AT
-            sizes[n] = np.int64(length) - BESIDES
+            sizes[n] = int(length) - BESIDES
             n += 1
         elif op in (SCHEMA, CHANNEL):
             if k == len(others):
                 break
             others[k] = at
             k += 1
-        at += HEAD + np.int64(length)
+        at += HEAD + int(length)
     return n, k, at
 
 
@@ -93,11 +98,11 @@ def decode(
     end: int,
     channel: int,
     size: int,
-    places: NDArray,
-    values: NDArray,
-    offsets: NDArray,
-    times: NDArray,
-    out: NDArray,
+    places: np.ndarray,
+    values: np.ndarray,
+    offsets: np.ndarray,
+    times: np.ndarray,
+    out: np.ndarray,
     first: int,
 ) -> int:
     """
@@ -140,7 +145,7 @@ def decode(
                 out[fields + j, n] = second * BILLION + nanosecond
             n += one
         at += head + length
-    return np.int64(n) - first if at == stop else -1
+    return int(n) - first if at == stop else -1
 
 
 def warm_up() -> None:

@@ -232,7 +232,7 @@ class Encoder:
         for name, text in texts.items():
             self._constant.view(self._dtype)[name] = text.encode()
 
-    def __call__(self, columns: Mapping[str, NDArray], stamp: NDArray[np.int64]) -> NDArray:
+    def __call__(self, columns: Mapping[str, np.ndarray], stamp: NDArray[np.int64]) -> np.ndarray:
         """
         Serialise columns.
 
@@ -242,7 +242,8 @@ class Encoder:
             other.
         :raises BagError: where a column is no field.
         """
-        messages: NDArray = np.repeat(self._constant, len(stamp), axis=0).view(self._dtype)[:, 0]
+        constant = np.repeat(self._constant, len(stamp), axis=0)
+        messages: np.ndarray = constant.view(self._dtype)[:, 0]
         header = {'header.stamp.sec': stamp // NANO, 'header.stamp.nanosec': stamp % NANO}
         for name, values in {**header, **columns}.items():
             if name not in (self._dtype.names or ()):

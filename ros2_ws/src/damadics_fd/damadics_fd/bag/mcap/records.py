@@ -175,7 +175,7 @@ class Fields:
         self._at += size
         return self._content[self._at - size : self._at]
 
-    def unpack(self, layout: struct.Struct) -> tuple:
+    def unpack(self, layout: struct.Struct) -> tuple[int, ...]:
         """Return the next fields of fixed size."""
         return layout.unpack(self.take(layout.size))
 

@@ -54,7 +54,7 @@ class Slot:
         if chunk.size > len(self._data):
             self._data = np.empty(chunk.size, np.uint8)
         data = self._data[: chunk.size]
-        if self._decompress(chunk, packed, memoryview(data)) != chunk.size:
+        if self._decompress(chunk, packed, memoryview(data.data)) != chunk.size:
             raise BagError('a chunk is damaged: its size does not match')
         if chunk.crc and crc32(data) != chunk.crc:
             raise BagError('a chunk is damaged: its CRC does not match')
@@ -132,7 +132,7 @@ def unpacked(stream: BinaryIO, path: Path, limits: Limits) -> BinaryIO:
     """
     most = limits.unpacked + limits.unpacked_ratio * os.fstat(stream.fileno()).st_size
     stream.seek(0)
-    plain: BinaryIO = tempfile.TemporaryFile()  # type: ignore[assignment]  # noqa: SIM115
+    plain: BinaryIO = tempfile.TemporaryFile()  # noqa: SIM115
     try:
         with zstandard.ZstdDecompressor().stream_reader(
             stream, read_across_frames=True, closefd=False

@@ -166,7 +166,7 @@ class McapWriter:
             self.end_chunk()
 
     def add_rows(
-        self, channels: Sequence[int], times: NDArray[np.integer], payloads: Sequence[NDArray]
+        self, channels: Sequence[int], times: NDArray[np.integer], payloads: Sequence[np.ndarray]
     ) -> None:
         """
         Write columns of messages: at each time one message for each channel, in this order.
@@ -203,7 +203,7 @@ class McapWriter:
             self.end_chunk()
 
     def add_records(
-        self, data: bytes, channels: NDArray, log_times: NDArray, offsets: NDArray
+        self, data: bytes, channels: np.ndarray, log_times: np.ndarray, offsets: np.ndarray
     ) -> None:
         """
         Write Message records that are encoded already as one chunk.

@@ -3,7 +3,7 @@
 """Which column of a table is which signal: our names, the benchmark's, the plant's tags."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from damadics_fd.bag.errors import BagError
@@ -120,7 +120,7 @@ def _find(names: Sequence[Header], target: str, source: Source) -> int:
     """Return the column that the user names."""
     wanted = ' '.join(source.name.split())
     full = f'{wanted}[{source.unit}]'.replace(' ', '')
-    tests = (
+    tests: tuple[Callable[[Header], bool], ...] = (
         lambda h: h.text == wanted,
         lambda h: h.text.replace(' ', '') == full,
         lambda h: h.name == wanted,
@@ -187,20 +187,20 @@ def assign(
         if header.name in OWN:
             own[header.name] = Use(i, header.scale(header.name))
         elif header.name in _SCALED:
-            signal, scale = _SCALED[header.name]
-            own[signal] = Use(i, header.scale(signal) if header.unit else scale)
-    time, scale = _time_of(names)
+            signal, usual = _SCALED[header.name]
+            own[signal] = Use(i, header.scale(signal) if header.unit else usual)
+    times, unit = _time_of(names)
     for target, source in chosen.items():
         column = _find(names, target, source)
         given = source.scale if source.told else None
         if target in TIMES:
-            time, scale = (column,), given
+            times, unit = (column,), given
             if target == 'stamp':
-                scale = (given or Scale()).then(Scale(1 / SECOND))
+                unit = (given or Scale()).then(Scale(1 / SECOND))
         else:  # the user's factor counts from the raw numbers
             own[target] = Use(column, given or names[column].scale(target))
     if {'cv', 'x1'} <= own.keys():
-        return {'': Assignment(own, time, scale)}
+        return {'': Assignment(own, times, unit)}
     tagged = {}
     for number, tags in TAGS.items():
         columns = dict(own)
@@ -209,5 +209,5 @@ def assign(
             if tag:
                 columns[tags[tag][0]] = Use(i, tags[tag][1])
         if actuator in (None, number) and {'cv', 'x1'} <= columns.keys():
-            tagged[f'A{number}'] = Assignment(columns, time, scale)
+            tagged[f'A{number}'] = Assignment(columns, times, unit)
     return tagged

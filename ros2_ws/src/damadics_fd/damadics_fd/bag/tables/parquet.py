@@ -32,7 +32,7 @@ class ParquetTable(Table):
 
     names: tuple[str, ...] = ()
 
-    def chunks(self, on_problem: Told) -> Iterator[dict[str, NDArray]]:
+    def chunks(self, on_problem: Told) -> Iterator[dict[str, np.ndarray]]:
         """
         Yield the columns in blocks of rows.
 

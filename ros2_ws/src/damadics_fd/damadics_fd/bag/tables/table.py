@@ -41,7 +41,7 @@ class Table:
     name: str
     assignment: Assignment
 
-    def chunks(self, on_problem: Told) -> Iterator[dict[str, NDArray]]:
+    def chunks(self, on_problem: Told) -> Iterator[dict[str, np.ndarray]]:
         """
         Yield the columns in blocks of rows.
 
@@ -51,8 +51,8 @@ class Table:
         raise NotImplementedError
 
     def timed(
-        self, stamp: NDArray[np.float64], columns: Mapping[str, NDArray], where: str, tell: Told
-    ) -> dict[str, NDArray] | None:
+        self, stamp: NDArray[np.float64], columns: Mapping[str, np.ndarray], where: str, tell: Told
+    ) -> dict[str, np.ndarray] | None:
         """Leave out the rows without a time [ns]; None where none has one."""
         good = np.isfinite(stamp) & (np.abs(np.nan_to_num(stamp)) < LAST_STAMP)
         if not good.all():
@@ -75,7 +75,7 @@ class TextTable(Table):
     layout: Layout
     start: int = 0
 
-    def chunks(self, on_problem: Told) -> Iterator[dict[str, NDArray]]:
+    def chunks(self, on_problem: Told) -> Iterator[dict[str, np.ndarray]]:
         """
         Yield the columns in blocks of rows.
 

@@ -192,7 +192,7 @@ class BagWriter:
     def write_columns(
         self,
         stamp: NDArray[np.int64],
-        messages: Mapping[str, Mapping[str, NDArray]],
+        messages: Mapping[str, Mapping[str, np.ndarray]],
         frame_id: str,
     ) -> None:
         """

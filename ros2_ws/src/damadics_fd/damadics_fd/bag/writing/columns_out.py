@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from damadics_fd.bag.mapping import SIGNALS
 from damadics_fd.bag.rosbag2 import qos
@@ -15,7 +14,7 @@ from damadics_fd.bag.writing.bag_writer import BagWriter
 
 def write_columns(
     path: str | Path,
-    columns: Mapping[str, NDArray],
+    columns: Mapping[str, np.ndarray],
     frame_id: str = 'LC74_20',
 ) -> None:
     """

@@ -70,7 +70,7 @@ def twin(proposal: Proposal) -> dict[str, float]:
             'no twin: the simulated actuator is closed by air and opened by the flow, this valve '
             f'has air to {s.air_to}, flow to {s.flow_to}'
         )
-    signals = gather([FaultFree('all', {**proposal.columns})])
+    signals = gather([FaultFree('all', proposal.columns)])
     fine = blocks(signals, FINE, s.ps_lag)
     static = max(breakaway(proposal, blocks(signals, SHORT, s.ps_lag)), b.friction)
     fill, vent = capacities(fine, s)

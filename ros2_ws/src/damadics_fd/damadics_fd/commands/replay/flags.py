@@ -5,7 +5,6 @@
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from damadics_fd.bag.columns import iter_columns
 from damadics_fd.bag.errors import BagError
@@ -75,7 +74,7 @@ class FlagWriter:
         )
         self._write_flags(decisions)
 
-    def _write_flags(self, decisions: NDArray) -> None:
+    def _write_flags(self, decisions: np.ndarray) -> None:
         """Write the flag on every change and once a second."""
         keys = np.stack(
             [

@@ -91,7 +91,7 @@ def learn(
     settings: ScadaSettings,
     until: float | None = None,
     notes: list[str] | None = None,
-) -> NDArray:
+) -> np.ndarray:
     """
     Return the reference learned from a fault-free record (sheet section 1.3).
 
@@ -159,7 +159,7 @@ def _pieces(part: Floats, settings: ScadaSettings, period: float) -> list[Piece]
     ]
 
 
-def _learn_inputs(ref: Any, reference: NDArray, part: Floats, settings: ScadaSettings) -> None:
+def _learn_inputs(ref: Any, reference: np.ndarray, part: Floats, settings: ScadaSettings) -> None:
     """Learn the pressure filters and how far the pressures move by themselves."""
     drop = part[:, PRESSURE_1] - part[:, PRESSURE_2]
     ref['dp_mean'] = ref['drop'] = float(np.nanmean(drop))
@@ -174,11 +174,11 @@ def _learn_inputs(ref: Any, reference: NDArray, part: Floats, settings: ScadaSet
 
 def _choose_stem(
     ref: Any,
-    reference: NDArray,
+    reference: np.ndarray,
     clean: Floats,
     part: Floats,
     settings: ScadaSettings,
-    window: NDArray,
+    window: np.ndarray,
     identified: StemFit,
 ) -> Prediction:
     """Take the stated actuator or the identified law: what predicts the second half better."""
@@ -208,7 +208,7 @@ def _choose_stem(
 
 
 def _predict(
-    samples: Floats, settings: ScadaSettings, reference: NDArray, window: NDArray, hold: bool
+    samples: Floats, settings: ScadaSettings, reference: np.ndarray, window: np.ndarray, hold: bool
 ) -> Prediction:
     trial = reference.copy()
     trial['hold'] = hold
@@ -222,13 +222,14 @@ def _predict(
 
 
 def _residuals(
-    samples: Floats, settings: ScadaSettings, reference: NDArray, window: NDArray
+    samples: Floats, settings: ScadaSettings, reference: np.ndarray, window: np.ndarray
 ) -> Floats:
     """Return the residuals of the record as the monitor will see them, NaN where not testable."""
     phi = np.empty((len(samples), N_WEIGHTS))
     models = np.empty((len(samples), 6 + N_RESIDUALS))
     _predict_record(np.zeros(1, MONITOR), settings.record(), reference, samples, phi, models)
-    return models[window][:, 6:]
+    residuals: Floats = models[window][:, 6:]
+    return residuals
 
 
 def _bias(phi: Floats, error: Floats, used: int) -> tuple[Floats, Floats]:

@@ -61,7 +61,7 @@ class ScadaDecision:
     alarm: bool
 
 
-def scada_samples(columns: Mapping[str, NDArray]) -> Floats:
+def scada_samples(columns: Mapping[str, np.ndarray]) -> Floats:
     """
     Return the columns of a recording as rows t, CV, X', P1', P2', T1', F', scaled to 0..1.
 
@@ -175,7 +175,7 @@ class ScadaMonitor:
     """
 
     def __init__(
-        self, settings: ScadaSettings | None = None, reference: NDArray | None = None
+        self, settings: ScadaSettings | None = None, reference: np.ndarray | None = None
     ) -> None:
         self.settings = settings or ScadaSettings()
         self._record = self.settings.record()
@@ -222,7 +222,7 @@ class ScadaMonitor:
             return 1.0
         return min(float(self.state.t - self.state.t_first) / self._learn_until, 1.0)
 
-    def hold(self, states: NDArray, reference: NDArray) -> None:
+    def hold(self, states: np.ndarray, reference: np.ndarray) -> None:
         """Go on with a state and a reference that are kept elsewhere, arrays of length 1."""
         self._state, self._given, self.reference = states, reference, reference
 
@@ -243,12 +243,12 @@ class ScadaMonitor:
         self._filled = rows
 
     @property
-    def states(self) -> NDArray:
+    def states(self) -> np.ndarray:
         """Return the array of length 1 that holds the record of the compiled step."""
         return self._state
 
     @property
-    def record(self) -> NDArray:
+    def record(self) -> np.ndarray:
         """Return the settings of the compiled step."""
         return self._record
 
@@ -294,7 +294,7 @@ class ScadaMonitor:
             alarm=bool(last['alarm']),
         )
 
-    def run(self, columns: Mapping[str, NDArray]) -> NDArray:
+    def run(self, columns: Mapping[str, np.ndarray]) -> np.ndarray:
         """
         Take a recording; the same result bit for bit as sample by sample.
 
@@ -303,7 +303,7 @@ class ScadaMonitor:
         """
         return self.run_samples(scada_samples(columns))
 
-    def run_samples(self, samples: Floats) -> NDArray:
+    def run_samples(self, samples: Floats) -> np.ndarray:
         """
         Take rows as `scada_samples` returns them.
 
@@ -347,7 +347,9 @@ class ScadaMonitor:
             off.append('the pressures (not measured)')
         return off
 
-    def _learn_from(self, samples: Floats, start: int, learned: NDArray) -> tuple[int, NDArray]:
+    def _learn_from(
+        self, samples: Floats, start: int, learned: np.ndarray
+    ) -> tuple[int, np.ndarray]:
         room = self._filled + len(samples) - start
         if room > len(self._buffer):
             larger = np.empty((max(room, 2 * len(self._buffer), 4096), 7))

@@ -15,9 +15,9 @@ True
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Self
 
-from damadics_fd.core.field import SettingsError
+from damadics_fd.core.field import Given, SettingsError
 from damadics_fd.core.record import Plain, Saved
 from damadics_fd.core.settings.settings import Settings
 
@@ -58,7 +58,7 @@ class ValveDocument:
         """
         given = parameters_in(content)
         known = {row['name'] for row in Settings.describe()}
-        values: dict[str, Any] = {name: value for name, value in given.items() if name in known}
+        values: dict[str, Given] = {name: value for name, value in given.items() if name in known}
         if mode:
             values['mode'] = mode
         return cls(

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import Field, asdict, dataclass, fields, replace
 from typing import Any, Self, TypedDict
 
-from damadics_fd.core.field import Section, SettingsError, Value, wrong_choice
+from damadics_fd.core.field import Given, Section, SettingsError, Value, wrong_choice
 from damadics_fd.core.modes import MODES
 from damadics_fd.core.record import Plain
 from damadics_fd.core.settings.approximation import Approximation
@@ -55,7 +55,7 @@ class Settings(Valve, ControlRoom, Explaining, LearningTime, Deciding, Approxima
     """
 
     @classmethod
-    def for_mode(cls, mode: str, **changes: Value) -> Self:
+    def for_mode(cls, mode: str, **changes: Given) -> Self:
         """
         Return the settings of a mode.
 
@@ -67,7 +67,7 @@ class Settings(Valve, ControlRoom, Explaining, LearningTime, Deciding, Approxima
         return cls.from_mapping({'mode': mode, **changes})
 
     @classmethod
-    def from_mapping(cls, values: Mapping[str, Value]) -> Self:
+    def from_mapping(cls, values: Mapping[str, Given]) -> Self:
         """
         Return settings from names and values, as a parameter file gives them.
 
@@ -96,14 +96,15 @@ class Settings(Valve, ControlRoom, Explaining, LearningTime, Deciding, Approxima
             raise SettingsError(problems)
         return settings
 
-    def replace(self, **changes: Any) -> Self:
+    def replace(self, **changes: Given) -> Self:
         """
         Return these settings with some changed.
 
         :param changes: settings by name.
         :return: the new settings.
         """
-        return replace(self, **changes)
+        values: dict[str, Any] = dict(changes)
+        return replace(self, **values)
 
     def valve(self) -> Valve:
         """

@@ -32,10 +32,14 @@ def expose(
     :param take: called with its number and each serialised measurement.
     :return: its publishers.
     """
+
+    def taken(data: bytes) -> None:
+        take(number, bytes(data))
+
     entities.subscription(
         Measurement,
         member.measurement,
-        lambda data: take(number, bytes(data)),
+        taken,
         qos.SAMPLES,
         raw=True,
     )

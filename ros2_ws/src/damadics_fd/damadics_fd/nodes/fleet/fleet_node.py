@@ -14,7 +14,6 @@ from damadics_msgs.msg import (
     FleetStatus,
     MeasurementBlock,
 )
-from rclpy.node import Node
 
 from damadics_fd.causes import explain
 from damadics_fd.core.decision.events import Decision, Event
@@ -35,7 +34,7 @@ from damadics_fd.ros.diagnostics import Diagnostics, Level, Report
 from damadics_fd.ros.entities import Entities
 from damadics_fd.ros.parameters import Parameters
 from damadics_fd.ros.raw import sample_of
-from damadics_fd.ros.spin import StartError, spin_all
+from damadics_fd.ros.spin import SpinnableNode, StartError, spin_all
 from damadics_fd.store.alarms import default_folder
 from damadics_fd.store.fleet_file import FleetError, Valve, read_fleet
 from damadics_fd.store.slots import check_folder
@@ -49,7 +48,7 @@ BATCH = 64  # of them that do not wait any longer
 MOST_EXPOSED = 50  # valves with topics of their own, unless the user says otherwise
 
 
-class FleetNode(Node):
+class FleetNode(SpinnableNode):
     """
     Judge blocks of measurements of many valves; publish what changes, and once a second all.
 
@@ -83,15 +82,15 @@ class FleetNode(Node):
         except FleetError as problem:
             raise StartError(f'{problem}') from problem
         folder = default_folder() if kept == 'auto' else Path(kept).expanduser() if kept else None
-        if folder and (problem := check_folder(folder)):
-            raise StartError(f'fleet cannot keep its alarms: alarm_folder: {problem}')
+        if folder and (cause := check_folder(folder)):
+            raise StartError(f'fleet cannot keep its alarms: alarm_folder: {cause}')
         self._keeping = Keeping(self, self._members, folder)
         self._keeping.restore()
         self._refused = blocks.Refused(len(self._members))
         self._judged = self._rejected = 0
         self._ages = Ages(
             np.array([1.0 / one.settings.sample_rate for one in self._members.all]),
-            self.get_parameter('use_sim_time').value,
+            bool(self.get_parameter('use_sim_time').value),
             max_age,
         )
         self._version = blocks.layout_version(

@@ -69,7 +69,7 @@ def push(past: np.ndarray, value: float) -> None:
     past[0] = value
 
 
-def learn_pressure(pressure: NDArray[np.float64], sigma: float, filt: NDArray) -> None:
+def learn_pressure(pressure: NDArray[np.float64], sigma: float, filt: np.ndarray) -> None:
     """
     Fit both predictors by ridge least squares, the fusion weight from the first one's error.
 

@@ -13,7 +13,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from damadics_fd.core.scada.laws.flow_law import FLOW_LAW, GAS, KNOTS, LIQUID, STEP, sizing
 from damadics_fd.core.scada.laws.robust import Floats, effective, huber_weights, spread_of
@@ -38,7 +37,7 @@ class FlowFit:
     :param used: samples fitted.
     """
 
-    law: NDArray
+    law: np.ndarray
     left: Floats
     used: int
 
@@ -139,7 +138,7 @@ def fit_flow(
 
 
 def _fit(
-    t: Floats, x: Floats, model_x: Floats, size: Floats, flow: Floats, good: NDArray, lag: float
+    t: Floats, x: Floats, model_x: Floats, size: Floats, flow: Floats, good: np.ndarray, lag: float
 ) -> tuple[float, Floats, Floats, Floats, float]:
     """Return robust spread, knots, their covariance and the residual for one lag of the meter."""
     a = hats(smooth(x, t, lag))[good]

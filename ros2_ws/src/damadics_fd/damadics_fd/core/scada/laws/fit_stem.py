@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from damadics_fd.core.scada.laws.robust import Floats, effective, huber_weights, loss_of, spread_of
 from damadics_fd.core.scada.laws.stem_law import (
@@ -53,7 +52,7 @@ class StemFit:
     :param gain_error: its standard error; infinite where CV hardly moves.
     """
 
-    law: NDArray
+    law: np.ndarray
     x: Floats
     error: Floats
     sigma: float
@@ -61,7 +60,7 @@ class StemFit:
     gain_error: float
 
 
-def run_law(law: NDArray, pieces: Sequence[Piece]) -> Floats:
+def run_law(law: np.ndarray, pieces: Sequence[Piece]) -> Floats:
     """Return law, slow copy (gain 1, offset 0) and the way to go over all pieces, (n, 3)."""
     track = np.zeros(1, STEM_TRACK)
     out = []
@@ -110,7 +109,7 @@ def fit_stem(pieces: Sequence[Piece], period: float) -> StemFit:
     return _finish(law, pieces, x)
 
 
-def _loss(law: NDArray, pieces: Sequence[Piece], x: Floats) -> float:
+def _loss(law: np.ndarray, pieces: Sequence[Piece], x: Floats) -> float:
     """Return a robust variance of what the law leaves, with gain 1 and a free offset."""
     e = x - run_law(law, pieces)[:, 0]
     e -= np.median(e)
@@ -118,7 +117,7 @@ def _loss(law: NDArray, pieces: Sequence[Piece], x: Floats) -> float:
 
 
 def _search(
-    law: NDArray,
+    law: np.ndarray,
     name: str,
     grid: Sequence[float],
     best: float,
@@ -137,7 +136,7 @@ def _search(
     return best
 
 
-def _proven(law: NDArray, pieces: Sequence[Piece]) -> None:
+def _proven(law: np.ndarray, pieces: Sequence[Piece]) -> None:
     """Set the rates of the slow copy: what the law was seen to do, in each direction."""
     track = run_law(law, pieces)[:, 0]
     t = np.concatenate([piece.t for piece in pieces])
@@ -161,7 +160,7 @@ def _transient(left: Floats, ahead: Floats, sigma: float) -> float:
     return max(TRANSIENT, TRANSIENT_ROOM * float(np.quantile(share, 0.995)))
 
 
-def _finish(law: NDArray, pieces: Sequence[Piece], x: Floats) -> StemFit:
+def _finish(law: np.ndarray, pieces: Sequence[Piece], x: Floats) -> StemFit:
     track = run_law(law, pieces)
     u = track[:, 0]
     centre = float(np.mean(u))

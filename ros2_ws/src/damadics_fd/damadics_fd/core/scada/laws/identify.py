@@ -6,7 +6,6 @@ import math
 from collections.abc import Collection, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from damadics_fd.core.identified import LIMITED, OK, REFUSED, FaultFree, Identified
 from damadics_fd.core.record import Plain
@@ -88,12 +87,12 @@ def pooled(recordings: Sequence[FaultFree]) -> Floats:
     return np.concatenate(parts)
 
 
-def unseen(reference: NDArray) -> float:
+def unseen(reference: np.ndarray) -> float:
     """Return which part of a plant's slow changes the recordings were too short to show."""
     return math.sqrt(HOURS_S / (HOURS_S + float(reference['seconds'][0])))
 
 
-def _stem(reference: NDArray) -> list[str]:
+def _stem(reference: np.ndarray) -> list[str]:
     """Tell what the stem does and which deviation of it is found."""
     law, ref = reference['stem_law'][0], reference[0]
     rates = [
@@ -114,7 +113,7 @@ def _stem(reference: NDArray) -> list[str]:
     ]
 
 
-def _flow(reference: NDArray, settings: Settings, notes: Sequence[str]) -> list[str]:
+def _flow(reference: np.ndarray, settings: Settings, notes: Sequence[str]) -> list[str]:
     """Tell what the flow does and which deviation of it is found."""
     ref = reference[0]
     law = ref['flow_law']
@@ -139,7 +138,7 @@ def _flow(reference: NDArray, settings: Settings, notes: Sequence[str]) -> list[
     return lines
 
 
-def _missed(reference: NDArray, period: float) -> list[str]:
+def _missed(reference: np.ndarray, period: float) -> list[str]:
     """Return what will not be found, and why."""
     ref = reference[0]
     measured = [bool(int(ref['signals']) >> i & 1) for i in range(7)]

@@ -12,7 +12,6 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from damadics_fd.core.jit import jit
 from damadics_fd.core.scada.judging.cusum import P1, P2, PROCESS, R2, T1, TESTS
@@ -195,7 +194,7 @@ class Isolator:
             shown = [Hypothesis(h.fault, h.strength, best - 10.0 * EQUAL) for h in shown]
         return Isolation(float(state['t']), len(window), (*shown, *ranking))
 
-    def _window(self, state: Any) -> NDArray:
+    def _window(self, state: Any) -> np.ndarray:
         count = int(state['samples'])
         kept = min(count, HISTORY_LENGTH)
         order = np.arange(count - kept, count) % HISTORY_LENGTH
@@ -204,7 +203,7 @@ class Isolator:
         self._late = len(window) > WINDOW
         return np.ascontiguousarray(window[-WINDOW:])
 
-    def _inputs(self, state: Any, window: NDArray) -> list[Hypothesis]:
+    def _inputs(self, state: Any, window: np.ndarray) -> list[Hypothesis]:
         """Return f7 or f17 where the inputs themselves show them."""
         fired = {
             test.residual
@@ -226,7 +225,7 @@ class Isolator:
         return []
 
     def _errors(
-        self, window: NDArray, stem: NDArray | None, flow: NDArray | None
+        self, window: np.ndarray, stem: np.ndarray | None, flow: np.ndarray | None
     ) -> tuple[float, float]:
         """Return the mean squared errors of X' and F'; the nominal ones where no fault acts."""
         nominal = np.zeros(1, FAULTS)
@@ -243,7 +242,7 @@ class Isolator:
             of_flow = self._nominal[1]
         return float(of_stem), float(of_flow)
 
-    def cost(self, window: NDArray, fault: int, strength: float) -> float:
+    def cost(self, window: np.ndarray, fault: int, strength: float) -> float:
         """
         Return the cost of one fault at one strength.
 
@@ -264,7 +263,7 @@ class Isolator:
             total += n * misfit(flow, self._variance[1])
         return total
 
-    def _grid(self, window: NDArray, fault: int) -> list[tuple[float, float]]:
+    def _grid(self, window: np.ndarray, fault: int) -> list[tuple[float, float]]:
         """Return cost and strength on a coarse grid."""
         grid = [0.0, *GRID, 1.0]
         if fault in TWO_SIDED:
@@ -278,7 +277,9 @@ class Isolator:
             grid = sorted({*grid, *(min(max(reached + d, 0.0), 1.0) for d in (-0.02, 0.0, 0.02))})
         return [(self.cost(window, fault, strength), strength) for strength in grid]
 
-    def _refine(self, window: NDArray, fault: int, grid: list[tuple[float, float]]) -> Hypothesis:
+    def _refine(
+        self, window: np.ndarray, fault: int, grid: list[tuple[float, float]]
+    ) -> Hypothesis:
         """Refine the best strength by golden section between its neighbours on the grid."""
         i = grid.index(min(grid))
         low, high = grid[max(i - 1, 0)][1], grid[min(i + 1, len(grid) - 1)][1]

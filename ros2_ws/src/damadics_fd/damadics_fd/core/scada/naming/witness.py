@@ -18,7 +18,6 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from damadics_fd.core.scada.judging.cusum import PROCESS, R1, R2
 from damadics_fd.core.scada.laws.robust import spread_of
@@ -36,7 +35,7 @@ STEM_FAULTS = (1, 4, 9, 10, 11, 12, 13, 15, 16)
 FLOW_FAULTS = (2, 3, 5, 6, 13, 18, 19)
 
 
-def by_witnesses(state: Any, ref: Any, window: NDArray) -> Isolation:
+def by_witnesses(state: Any, ref: Any, window: np.ndarray) -> Isolation:
     """
     Rank the faults by what witnesses say, nats for and against.
 
@@ -71,7 +70,7 @@ def by_witnesses(state: Any, ref: Any, window: NDArray) -> Isolation:
     return Isolation(float(window['t'][-1]), len(window), tuple(ranking))
 
 
-def _process(score: dict[int, float], state: Any, shown: NDArray, early: Any) -> None:
+def _process(score: dict[int, float], state: Any, shown: np.ndarray, early: Any) -> None:
     """Judge pressures that move by themselves."""
     if not math.isnan(float(shown[PROCESS])) and early(PROCESS):
         against = state['sign'][R2] > 0.0 and early(R2)
@@ -80,7 +79,7 @@ def _process(score: dict[int, float], state: Any, shown: NDArray, early: Any) ->
         score[17] -= FAIR
 
 
-def _flow(score: dict[int, float], state: Any, ref: Any, window: NDArray) -> None:
+def _flow(score: dict[int, float], state: Any, ref: Any, window: np.ndarray) -> None:
     """Judge a flow that does not fit position and pressures while the stem obeys."""
     for fault in FLOW_FAULTS:
         score[fault] += GOOD
@@ -104,12 +103,12 @@ def _flow(score: dict[int, float], state: Any, ref: Any, window: NDArray) -> Non
         score[19] += FAIR * 0.5
 
 
-def _few(window: NDArray) -> int:
+def _few(window: np.ndarray) -> int:
     """Return how many rows the first moments of a fault are."""
     return max(int(np.searchsorted(window['t'], window['t'][0] + 15.0)), 3)
 
 
-def drop_change(ref: Any, state: Any, window: NDArray) -> float:
+def drop_change(ref: Any, state: Any, window: np.ndarray) -> float:
     """Return the change of log(P1 - P2) in the first moments against the level before."""
     before = float(state['level_before'][0] - state['level_before'][1])
     part = window[: _few(window)]
@@ -121,7 +120,7 @@ def drop_change(ref: Any, state: Any, window: NDArray) -> float:
     return math.log(least / before)
 
 
-def _stem(score: dict[int, float], state: Any, ref: Any, window: NDArray) -> None:
+def _stem(score: dict[int, float], state: Any, ref: Any, window: np.ndarray) -> None:
     """Judge a stem that is not where its command asks while the flow fits the stem."""
     for fault in STEM_FAULTS:
         score[fault] += FAIR

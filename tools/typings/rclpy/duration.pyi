@@ -1,0 +1,6 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+class Duration:
+    def __init__(self, *, seconds: float = 0, nanoseconds: int = 0) -> None: ...
+    @property
+    def nanoseconds(self) -> int: ...

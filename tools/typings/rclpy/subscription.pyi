@@ -1,0 +1,6 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+class Subscription:
+    def get_publisher_count(self) -> int: ...
+    @property
+    def topic_name(self) -> str: ...

@@ -1,0 +1,9 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+from builtin_interfaces.msg import Time as TimeMessage
+
+class Time:
+    def __init__(self, *, seconds: float = 0, nanoseconds: int = 0) -> None: ...
+    @property
+    def nanoseconds(self) -> int: ...
+    def to_msg(self) -> TimeMessage: ...

@@ -1,0 +1,3 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+def remove_ros_args(args: list[str] | None = None) -> list[str]: ...
