@@ -16,8 +16,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from damadics_fd.bag.arrays import Columns
 from damadics_fd.bag.cdr import kernels
-from damadics_fd.bag.cdr.decoder import Columns, Decoder, join
+from damadics_fd.bag.cdr.decoder import Decoder, join
 from damadics_fd.bag.errors import BagError, printable
 from damadics_fd.bag.limits import Limits
 from damadics_fd.bag.messages import MessageFile

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from damadics_fd.bag.cdr.decoder import Columns
+from damadics_fd.bag.arrays import Column, Columns, Places
 from damadics_fd.bag.cdr.definition import full_name
 from damadics_fd.bag.columns import iter_columns, listing, open_files, read_columns
 from damadics_fd.bag.errors import BagError, NoMeasurementError
@@ -150,7 +150,7 @@ class Recording:
         return 'log_time'
 
 
-def hold(stamp: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.ndarray:
+def hold(stamp: Places, values: Column, at: Places) -> Column:
     """
     Return the latest value at each instant, NaN before the first.
 

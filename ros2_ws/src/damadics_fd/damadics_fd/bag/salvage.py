@@ -191,22 +191,21 @@ class _Copy:
     def _extras(self, mcap: McapFile) -> bool:
         """Copy attachments and metadata; tell whether one of them describes the bag."""
         described = False
-        metadata = iter(mcap.metadata)
         for extent in mcap.extras:
             if extent.op == Op.ATTACHMENT:
-                about = parse_attachment(mcap.read_bytes, extent.at)
-                self._writer.put_attachment(about, extent.length, _blocks(mcap, extent))
+                if mcap.is_intact(extent):
+                    about = parse_attachment(mcap.read_bytes, extent.at)
+                    self._writer.put_attachment(about, extent.length, _blocks(mcap, extent))
                 continue
-            name, _ = next(metadata, ('', {}))
-            if name == ROSBAG2 and not self._whole:
+            if extent.name == ROSBAG2 and not self._whole:
                 continue  # its counts no longer hold
-            described |= name == ROSBAG2
-            self._writer.put_metadata(name, mcap.read_bytes(extent.at, extent.length))
+            described |= extent.name == ROSBAG2
+            self._writer.put_metadata(extent.name, mcap.read_bytes(extent.at, extent.length))
         return described or (self._whole and not _describes(mcap))
 
 
 def _describes(mcap: McapFile) -> bool:
-    return any(name == ROSBAG2 for name, _ in mcap.metadata)
+    return any(extra.op == Op.METADATA and extra.name == ROSBAG2 for extra in mcap.extras)
 
 
 def _blocks(mcap: McapFile, extent: Extent) -> Iterator[bytes]:

@@ -5,7 +5,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from damadics_fd.bag.cdr.decoder import Columns
+from damadics_fd.bag.arrays import Columns
 from damadics_fd.core.result import Result
 
 MOST_ROWS = 60_000  # kept, before they are thinned further

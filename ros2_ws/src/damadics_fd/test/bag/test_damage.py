@@ -99,14 +99,15 @@ def test_a_bag_cut_at_any_byte_gives_all_messages_of_complete_chunks(tmp_path):
     small_bag(whole)
     data, ends = whole.read_bytes(), chunk_ends(whole)
     first = data.index(b'ros2msg')
-    for size in range(len(data)):
+    near = {end + step for end in ends for step in range(-20, 21)}
+    for size in sorted({*range(0, len(data), 7), *near, *range(len(data) - 40, len(data))}):
         cut.write_bytes(data[:size])
         expected = list(range(ROWS * sum(end <= size for end in ends)))
         assert seconds(cut) == expected, size
         report = inspect(cut)
         assert report.code == (LOSSY if expected else UNUSABLE), (size, report)
         assert report.messages == len(expected)
-        if size % 37 == 0 and size > first:
+        if size % 35 == 0 and size > first:
             saved.unlink(missing_ok=True)
             assert salvage(cut, saved).code == report.code
             assert seconds(saved) == expected if expected else not saved.exists()
@@ -224,14 +225,14 @@ def test_hostile_files_cost_bounded_memory_and_time(tmp_path, name):
     (tmp_path / 'bad.mcap').write_bytes(data[:second] + HOSTILE[name]() + data[second:])
     inspect(tmp_path / 'a.mcap')  # whatever is compiled or imported once
     tracemalloc.start()
-    began = time.perf_counter()
+    began = time.process_time()
     report = inspect(tmp_path / 'bad.mcap')
-    spent = time.perf_counter() - began
+    spent = time.process_time() - began
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert report.code == LOSSY
     assert report.messages == CHUNKS * ROWS  # the rest is intact
-    assert spent < 20.0
+    assert spent < 10.0
     assert peak < 150e6
     if name not in ('many channels', 'zeros'):
         with pytest.raises(BagError, match='see verify and recover'):

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from damadics_fd.bag.arrays import Column, Columns, Places
 from damadics_fd.bag.cdr import kernels
 from damadics_fd.bag.cdr.definition import Definition, parse_definition
 from damadics_fd.bag.cdr.groups import Alike, first_message
@@ -16,7 +17,6 @@ from damadics_fd.bag.cdr.layout import Layout, Place, layout_of
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.messages import Batch, MessageFile
 
-Columns = dict[str, np.ndarray]
 MOST_LAYOUTS = 64  # in one chunk, that are looked for by column
 MOST_PLACES = 1 << 17  # of the layouts that are remembered
 _ELEMENT = re.compile(r'\.\d+(\.|$)')  # a member of a sequence of messages: no column
@@ -60,7 +60,7 @@ class Decoder:
             name: np.empty(0, np.int64) for name in ('stamp', 'log_time')
         }
 
-    def decode(self, batch: Batch, starts: np.ndarray, sizes: np.ndarray) -> Columns:
+    def decode(self, batch: Batch, starts: Places, sizes: Places) -> Columns:
         """
         Decode messages of this channel.
 
@@ -71,7 +71,7 @@ class Decoder:
         :raises BagError: where a message does not follow its definition or lacks a field.
         """
         left = np.ones(len(starts), bool)
-        groups: list[tuple[np.ndarray, Columns]] = []
+        groups: list[tuple[NDArray[np.bool_], Columns]] = []
         while left.any():
             first = int(left.argmax())
             layout = self._layout(batch.data[starts[first] : starts[first] + sizes[first]])
@@ -150,7 +150,7 @@ class Decoder:
             self._layouts.pop(0)
         return layout
 
-    def _columns(self, words: Words, starts: np.ndarray, layout: Layout) -> Columns:
+    def _columns(self, words: Words, starts: Places, layout: Layout) -> Columns:
         return {
             name: _time(words, starts + place, layout.order)
             if isinstance(place, int)
@@ -187,7 +187,7 @@ class Decoder:
         return {name: found[name] for name in chosen if name != 'log_time'}
 
 
-def same_layout(words: Words, starts: np.ndarray, layout: Layout) -> NDArray[np.bool_]:
+def same_layout(words: Words, starts: Places, layout: Layout) -> NDArray[np.bool_]:
     """Tell which messages have their fields at the places of a layout."""
     same: NDArray[np.bool_] = words.w2[starts] == (0x0100 if layout.order == '<' else 0)
     for offset, value in layout.lengths:
@@ -195,17 +195,17 @@ def same_layout(words: Words, starts: np.ndarray, layout: Layout) -> NDArray[np.
     return same
 
 
-def _ordered(values: np.ndarray, order: str) -> np.ndarray:
+def _ordered(values: Column, order: str) -> Column:
     return values if order == '<' else values.byteswap()
 
 
-def _time(words: Words, at: np.ndarray, order: str) -> NDArray[np.int64]:
-    seconds = _ordered(words.w4[at], order).view(np.int32)
-    time: NDArray[np.int64] = seconds * np.int64(10**9) + _ordered(words.w4[at + 4], order)
-    return time
+def _time(words: Words, at: Places, order: str) -> NDArray[np.int64]:
+    seconds = _ordered(words.w4[at], order).view(np.int32).astype(np.int64)
+    stamps: NDArray[np.int64] = seconds * 10**9 + _ordered(words.w4[at + 4], order)
+    return stamps
 
 
-def _field(words: Words, starts: np.ndarray, place: Place, order: str) -> np.ndarray:
+def _field(words: Words, starts: Places, place: Place, order: str) -> Column:
     """Gather any field: numbers, arrays, strings."""
     if place.text and place.dtype == 'u4':
         return _wide(words, starts, place, order)
@@ -218,14 +218,14 @@ def _field(words: Words, starts: np.ndarray, place: Place, order: str) -> np.nda
             'replace',
         )
     size = int(place.dtype[1])
-    source: np.ndarray = words[(1, 2, 4, 8).index(size)]
+    source: Column = words[(1, 2, 4, 8).index(size)]
     if place.repeat is None:
         return _ordered(source[starts + place.offset], order).view(place.dtype)
     at = starts[:, None] + (place.offset + size * np.arange(place.repeat))
     return _ordered(source[at], order).view(place.dtype)
 
 
-def _wide(words: Words, starts: np.ndarray, place: Place, order: str) -> np.ndarray:
+def _wide(words: Words, starts: Places, place: Place, order: str) -> Column:
     """Gather a wstring, whose units of UTF-16 take four bytes each."""
     count = place.repeat or 0
     if not count:
@@ -235,21 +235,21 @@ def _wide(words: Words, starts: np.ndarray, place: Place, order: str) -> np.ndar
     return np.array(texts, 'U')
 
 
-def _merge(groups: list[tuple[np.ndarray, Columns]]) -> Columns:
+def _merge(groups: list[tuple[NDArray[np.bool_], Columns]]) -> Columns:
     """Put the messages of several layouts back in order."""
     order = np.argsort(np.concatenate([np.flatnonzero(rows) for rows, _ in groups]))
     names = [name for name in groups[0][1] if all(name in part for _, part in groups)]
     return {name: join([part[name] for _, part in groups])[order] for name in names}
 
 
-def join(arrays: list[np.ndarray]) -> np.ndarray:
+def join(arrays: list[Column]) -> Column:
     """Put the pieces of a column together; rows of changing length become objects."""
     if len({array.shape[1:] for array in arrays}) > 1:
         arrays = [_rows(array) for array in arrays]
     return np.concatenate(arrays)
 
 
-def _rows(array: np.ndarray) -> np.ndarray:
+def _rows(array: Column) -> Column:
     rows = np.empty(len(array), object)
     rows[:] = list(array)
     return rows

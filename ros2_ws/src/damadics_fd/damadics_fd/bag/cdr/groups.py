@@ -8,6 +8,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from damadics_fd.bag.arrays import Columns
 from damadics_fd.bag.cdr import kernels
 from damadics_fd.bag.cdr.kernels import BODY_AT, LOG_TIME, Words
 from damadics_fd.bag.cdr.layout import Layout, Place
@@ -76,7 +77,7 @@ class Alike:
             )
         )
 
-    def columns(self, block: NDArray[np.uint64]) -> dict[str, np.ndarray]:
+    def columns(self, block: NDArray[np.uint64]) -> Columns:
         """View a block as columns."""
         return {name: block[row].view(kind) for row, (name, kind) in enumerate(self.kinds.items())}
 

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from damadics_fd.bag.arrays import Places
 from damadics_fd.bag.mcap.records import Op
 from damadics_fd.core.jit import jit
 
@@ -53,10 +54,10 @@ def words(data: NDArray[np.uint8]) -> Words:
 def index(
     words: Words,
     end: int,
-    channels: np.ndarray,
-    starts: np.ndarray,
-    sizes: np.ndarray,
-    others: np.ndarray,
+    channels: NDArray[np.uint16],
+    starts: Places,
+    sizes: Places,
+    others: Places,
 ) -> tuple[int, int, int]:
     """
     Walk the records of a chunk by their heads.
@@ -81,14 +82,14 @@ def index(
                 break
             channels[n] = words.w2[at + CHANNEL_AT]
             starts[n] = at + BODY_AT
-            sizes[n] = int(length) - BESIDES
+            sizes[n] = int(np.int64(length)) - BESIDES
             n += 1
         elif op in (SCHEMA, CHANNEL):
             if k == len(others):
                 break
             others[k] = at
             k += 1
-        at += HEAD + int(length)
+        at += HEAD + int(np.int64(length))
     return n, k, at
 
 
@@ -98,11 +99,11 @@ def decode(
     end: int,
     channel: int,
     size: int,
-    places: np.ndarray,
-    values: np.ndarray,
-    offsets: np.ndarray,
-    times: np.ndarray,
-    out: np.ndarray,
+    places: NDArray[np.uint64],
+    values: NDArray[np.uint32],
+    offsets: NDArray[np.uint64],
+    times: NDArray[np.uint64],
+    out: NDArray[np.uint64],
     first: int,
 ) -> int:
     """
@@ -145,12 +146,12 @@ def decode(
                 out[fields + j, n] = second * BILLION + nanosecond
             n += one
         at += head + length
-    return int(n) - first if at == stop else -1
+    return int(np.int64(n)) - first if at == stop else -1
 
 
 def warm_up() -> None:
     """Compile the loops, or load them from the cache."""
     data, none = words(np.zeros(SHORTEST, np.uint8)), np.empty(0, np.int64)
     index(data, 0, np.empty(0, np.uint16), none, none, none)
-    none = none.view(np.uint64)
-    decode(data, 0, 0, 0, none, np.empty(0, np.uint32), none, none, np.empty((1, 2), np.uint64), 0)
+    wide, values = np.empty(0, np.uint64), np.empty(0, np.uint32)
+    decode(data, 0, 0, 0, wide, values, wide, wide, np.empty((1, 2), np.uint64), 0)

@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from damadics_fd.bag.arrays import Column
 from damadics_fd.bag.cdr.definition import (
     DEEPEST,
     PRIMITIVES,
@@ -232,7 +233,7 @@ class Encoder:
         for name, text in texts.items():
             self._constant.view(self._dtype)[name] = text.encode()
 
-    def __call__(self, columns: Mapping[str, np.ndarray], stamp: NDArray[np.int64]) -> np.ndarray:
+    def __call__(self, columns: Mapping[str, Column], stamp: NDArray[np.int64]) -> Column:
         """
         Serialise columns.
 
@@ -242,8 +243,7 @@ class Encoder:
             other.
         :raises BagError: where a column is no field.
         """
-        constant = np.repeat(self._constant, len(stamp), axis=0)
-        messages: np.ndarray = constant.view(self._dtype)[:, 0]
+        messages: Column = np.repeat(self._constant, len(stamp), axis=0).view(self._dtype)[:, 0]
         header = {'header.stamp.sec': stamp // NANO, 'header.stamp.nanosec': stamp % NANO}
         for name, values in {**header, **columns}.items():
             if name not in (self._dtype.names or ()):

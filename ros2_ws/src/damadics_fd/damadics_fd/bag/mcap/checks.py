@@ -7,13 +7,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from damadics_fd.bag.errors import BagError
-from damadics_fd.bag.mcap.records import HEAD, Extent, Op, parse_attachment
+from damadics_fd.bag.mcap.records import HEAD, Extent, Op
 from damadics_fd.bag.mcap.summary import Indexed, Summary
 from damadics_fd.bag.messages import MESSAGE_HEAD, Batch
 
 Read = Callable[[int, int], bytes]  # place, size
-Crc = Callable[[int, int], int]  # place, size
 Tell = Callable[[int, str], None]  # place, what is wrong there
 
 
@@ -49,29 +47,15 @@ def check_message_index(read: Read, tell: Tell, indexed: Indexed, batch: Batch) 
             tell(at, 'the message index does not match the chunk')
 
 
-def check_extras(
-    read: Read, crc: Crc, tell: Tell, summary: Summary, extras: list[Extent], end: int
-) -> None:
+def check_extras(tell: Tell, summary: Summary, extras: list[Extent], end: int) -> None:
     """
-    Check attachments and metadata: CRC, index and number.
+    Compare attachments and metadata with their index and number.
 
-    :param read: reads bytes of the file.
-    :param crc: computes the CRC of bytes of the file.
     :param tell: told what does not match.
     :param summary: what the end of the file says.
     :param extras: those that are there.
     :param end: place of the end of the data section.
     """
-    for op, at, _ in extras:
-        if op != Op.ATTACHMENT:
-            continue
-        try:
-            attachment = parse_attachment(read, at)
-        except BagError as error:
-            tell(at, error.reason)
-            continue
-        if attachment.crc and crc(at + HEAD.size, attachment.size) != attachment.crc:
-            tell(at, 'an attachment is damaged: its CRC does not match')
     places = {Op.ATTACHMENT: summary.attachments, Op.METADATA: summary.metadata}
     for op, listed in places.items():
         there = {extra.at: extra.length for extra in extras if extra.op == op}

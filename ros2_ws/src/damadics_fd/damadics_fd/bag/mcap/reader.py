@@ -22,13 +22,14 @@ from damadics_fd.bag.mcap.records import (
     Extent,
     Fields,
     Op,
+    parse_attachment,
     parse_metadata,
     record,
 )
-from damadics_fd.bag.mcap.search import BEGIN, find_records
+from damadics_fd.bag.mcap.search import BEGIN, find_records, follows
 from damadics_fd.bag.mcap.summary import read_summary
 from damadics_fd.bag.mcap.unpack import open_plain
-from damadics_fd.bag.mcap.wellformed import well_formed
+from damadics_fd.bag.mcap.wellformed import fields_end, well_formed
 from damadics_fd.bag.messages import Batch, MessageFile
 
 LOOSE = 1 << 20  # [B] handled at a time where there are no chunks
@@ -57,14 +58,14 @@ class McapFile(MessageFile):
 
     def __init__(self, path: str | Path, tolerant: bool = False, limits: Limits = Limits()):
         super().__init__(path, tolerant, limits)
-        self.metadata: list[tuple[str, dict[str, str]]] = []
-        self.extras: list[Extent] = []  # attachments and metadata
+        self.extras: list[Extent] = []  # attachments and metadata that can be read
         self.end = 0  # [B] where the walk has seen the end of the data section
         self.crc = 0  # of the data section, 0 where the file has none
         self._chunk_places: set[int] = set()
         self._unpacked = 0  # [B] of dense chunks so far
         self._stream: BinaryIO = open_plain(self.path, limits)
         self._size = os.fstat(self._stream.fileno()).st_size
+        self._bounds = self._size, limits.record
         self.summary = read_summary(self.read_bytes, self._size, limits)
         self.schemas.update(self.summary.schemas)
         self.channels.update(list(self.summary.channels.items())[: limits.channels])
@@ -123,7 +124,7 @@ class McapFile(MessageFile):
     def _records(self) -> Iterator[tuple[int, _Found]]:
         """Yield chunks and messages of the data section; take note of everything else."""
         at = 0
-        self.metadata, self.extras, self._chunk_places, self._unpacked = [], [], set(), 0
+        self.extras, self._chunk_places, self._unpacked = [], set(), 0
         if self.read_bytes(0, len(MAGIC)) == MAGIC:
             at = len(MAGIC)
         else:
@@ -139,8 +140,7 @@ class McapFile(MessageFile):
                 following = find_records(
                     self.read_bytes,
                     (at if doubtful is None else doubtful) + 1,
-                    self._size,
-                    self.limits.record,
+                    *self._bounds,
                     self._chunked,
                 )
                 if following is None:
@@ -165,6 +165,8 @@ class McapFile(MessageFile):
         if len(begin) < HEAD.size:
             raise BagError('ends in the middle of a record')
         op, length = HEAD.unpack_from(begin)
+        if 0 < op < KNOWN:
+            length = self._length(Op(op), at, length, begin[HEAD.size :])
         content = begin[HEAD.size :][:length]
         if op == Op.CHUNK and not self._chunked:
             self._chunked = well_formed(Op.CHUNK, content, length)
@@ -190,6 +192,15 @@ class McapFile(MessageFile):
         elif op in (Op.METADATA, Op.ATTACHMENT):
             self._note_extra(op, at, length, content)
         return _Found(op, length, content)
+
+    def _length(self, op: Op, at: int, stated: int, content: bytes) -> int:
+        """Return the length of a record: by its fields, where other records follow these."""
+        end, complete = fields_end(op, content)
+        behind = at + HEAD.size + end
+        if end == stated or not complete or not follows(self.read_bytes, behind, *self._bounds):
+            return stated
+        self.problem(at, f'the length of the {op.name} record is damaged')
+        return end
 
     def _chunk(self, at: int, length: int, content: bytes) -> NDArray[np.uint8]:
         """Load a chunk and compare its head with the index."""
@@ -218,9 +229,17 @@ class McapFile(MessageFile):
         if len(self.extras) >= self.limits.attachments:
             self.once(f'there are more than {self.limits.attachments} attachments and metadata')
             return
-        self.extras.append(Extent(op, at, HEAD.size + length))
-        if op == Op.METADATA and self.room(len(content)):
-            self.metadata.append(parse_metadata(content))
+        if op == Op.ATTACHMENT:
+            name = parse_attachment(self.read_bytes, at).name
+        else:
+            name, _ = parse_metadata(content)
+        if self.room(len(name)):
+            self.extras.append(Extent(op, at, HEAD.size + length, name))
+
+    def is_intact(self, attachment: Extent) -> bool:
+        """Tell whether the CRC of an attachment matches, where it has one."""
+        about = parse_attachment(self.read_bytes, attachment.at)
+        return not about.crc or self.crc_of(attachment.at + HEAD.size, about.size) == about.crc
 
     def _check_end(self) -> None:
         """Compare what was read with index and statistics."""
@@ -263,9 +282,10 @@ class McapFile(MessageFile):
         :raises BagError: at damage, unless it is tolerated.
         """
         self.check_crc()
-        check_extras(
-            self.read_bytes, self.crc_of, self.problem, self.summary, self.extras, self.end
-        )
+        for extra in self.extras:
+            if extra.op == Op.ATTACHMENT and not self.is_intact(extra):
+                self.problem(extra.at, 'an attachment is damaged: its CRC does not match')
+        check_extras(self.problem, self.summary, self.extras, self.end)
         if self.end and self.summary.absent:
             self.remarks.append('the file has no summary')
 

@@ -73,11 +73,12 @@ class Channel:
 
 
 class Extent(NamedTuple):
-    """A whole record in a file: its place and its length with head [B]."""
+    """A whole record in a file: its place, its length with head [B], and what it is called."""
 
     op: Op
     at: int
     length: int
+    name: str
 
 
 class Attachment(NamedTuple):

@@ -54,7 +54,7 @@ class Slot:
         if chunk.size > len(self._data):
             self._data = np.empty(chunk.size, np.uint8)
         data = self._data[: chunk.size]
-        if self._decompress(chunk, packed, memoryview(data.data)) != chunk.size:
+        if self._decompress(chunk, packed, data.data) != chunk.size:
             raise BagError('a chunk is damaged: its size does not match')
         if chunk.crc and crc32(data) != chunk.crc:
             raise BagError('a chunk is damaged: its CRC does not match')

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tell from the lengths inside a record whether it can be one."""
 
-from damadics_fd.bag.mcap.records import Op
+from damadics_fd.bag.mcap.records import HEAD, MESSAGE, Op
 
 TEXT, DATA = -1, -2  # fields with a u32 or a u64 in front that is their size
 _SHAPES: dict[Op, tuple[int, ...]] = {  # sizes of the fields in order
@@ -41,15 +41,31 @@ def well_formed(op: Op, content: bytes, length: int) -> bool:
     >>> well_formed(Op.MESSAGE_INDEX, bytes.fromhex('0100 11000000') + bytes(16), 22)
     False
     """
+    end, complete = fields_end(op, content[:length])
+    return end == length if complete and op in _FIXED else end <= length
+
+
+def fields_end(op: Op, content: bytes) -> tuple[int, bool]:
+    """
+    Return where the fields of a record end by their own lengths, whatever the record's.
+
+    :param op: its opcode.
+    :param content: the beginning of its content.
+    :return: the place; False where there may be more fields than `content` shows, and for a
+        message, which does not say how long it is.
+
+    >>> fields_end(Op.MESSAGE_INDEX, bytes.fromhex('0100 10000000') + bytes(19))
+    (22, True)
+    """
     if op == Op.MESSAGE:
-        return length >= 22
+        return MESSAGE.size - HEAD.size, False
     at = 0
     for size in _SHAPES[op]:
         if size < 0:
             prefix = 4 if size == TEXT else 8
             if at + prefix > len(content):
-                return at + prefix <= length
+                return at + prefix, False
             at += prefix + int.from_bytes(content[at : at + prefix], 'little')
         else:
             at += size
-    return at == length if op in _FIXED else at <= length
+    return at, True

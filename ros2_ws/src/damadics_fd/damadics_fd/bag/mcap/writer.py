@@ -5,22 +5,21 @@
 import struct
 import time
 from collections.abc import Iterable, Sequence
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from damadics_fd.bag.arrays import Column, Places
 from damadics_fd.bag.grouping import grouped
 from damadics_fd.bag.mcap.crc import crc32
+from damadics_fd.bag.mcap.ending import Ending
 from damadics_fd.bag.mcap.packing import Packer
 from damadics_fd.bag.mcap.records import (
     CHUNK,
-    CHUNK_INDEX,
-    FOOTER,
     HEAD,
     MAGIC,
     MESSAGE,
-    STATISTICS,
     Attachment,
     Channel,
     Op,
@@ -41,7 +40,7 @@ LEVEL = -4  # of zstd: a tenth larger than 1, and less than half the time to rea
 class Sink(Protocol):
     """Where the bytes go."""
 
-    def write(self, data: Any, /) -> int | None:
+    def write(self, data: bytes, /) -> int | None:
         """Append all of `data`."""
 
     def flush(self) -> None:
@@ -75,13 +74,7 @@ class McapWriter:
         self._chunk_size = chunk_size
         self._message_index = message_index
         self._pack = Packer(level)
-        self._schemas: list[Schema] = []
-        self._channels: list[Channel] = []
-        self._counts: dict[int, int] = {}
-        self._chunk_index: list[bytes] = []
-        self._attachment_index: list[bytes] = []
-        self._metadata_index: list[bytes] = []
-        self._times: tuple[int, int] | None = None
+        self._ending = Ending()
         self._crc = 0  # of the data section
         self._reset_chunk()
         self.position = 0  # [B] written to the stream so far
@@ -113,32 +106,31 @@ class McapWriter:
     @property
     def message_count(self) -> int:
         """Messages written so far."""
-        return sum(self._counts.values())
+        return self._ending.counts.total()
 
     def add_schema(self, name: str, encoding: str, data: bytes) -> int:
         """Write a schema and return its number."""
-        schema = Schema(len(self._schemas) + 1, name, encoding, data)
+        schema = Schema(self._ending.schemas + 1, name, encoding, data)
         self.put_schema(schema)
         return schema.id
 
     def put_schema(self, schema: Schema) -> None:
         """Write a schema that has its number."""
         self._write(schema_record(schema))
-        self._schemas.append(schema)
+        self._ending.note_schema(schema)
 
     def add_channel(
         self, schema_id: int, topic: str, message_encoding: str, metadata: dict[str, str]
     ) -> int:
         """Write a channel and return its number."""
-        channel = Channel(len(self._channels) + 1, schema_id, topic, message_encoding, metadata)
+        channel = Channel(self._ending.channels + 1, schema_id, topic, message_encoding, metadata)
         self.put_channel(channel)
         return channel.id
 
     def put_channel(self, channel: Channel) -> None:
         """Write a channel that has its number."""
         self._write(channel_record(channel))
-        self._channels.append(channel)
-        self._counts[channel.id] = 0
+        self._ending.note_channel(channel)
 
     def add_message(
         self, channel_id: int, data: bytes, log_time: int, publish_time: int, sequence: int = 0
@@ -161,12 +153,12 @@ class McapWriter:
         self._index.setdefault(channel_id, []).append(struct.pack('<QQ', log_time, self._size))
         self._log_times.append(log_time)
         self._size += HEAD.size + length
-        self._counts[channel_id] += 1
+        self._ending.counts[channel_id] += 1
         if self._size >= self._chunk_size:
             self.end_chunk()
 
     def add_rows(
-        self, channels: Sequence[int], times: NDArray[np.integer], payloads: Sequence[np.ndarray]
+        self, channels: Sequence[int], times: NDArray[np.int64], payloads: Sequence[Column]
     ) -> None:
         """
         Write columns of messages: at each time one message for each channel, in this order.
@@ -196,14 +188,18 @@ class McapWriter:
                 offset = row.fields[f'm{i}'][1]  # type: ignore[index]
                 offsets = np.arange(len(rows), dtype='<u8') * row.itemsize + offset
                 self._index[channel] = [np.stack([stamps, offsets], axis=1).tobytes()]
-                self._counts[channel] += len(rows)
+                self._ending.counts[channel] += len(rows)
             self._parts = [rows.tobytes()]
             self._size = rows.nbytes
             self._log_times = [int(stamps[0]), int(stamps[-1])]
             self.end_chunk()
 
     def add_records(
-        self, data: bytes, channels: np.ndarray, log_times: np.ndarray, offsets: np.ndarray
+        self,
+        data: bytes,
+        channels: NDArray[np.uint16],
+        log_times: NDArray[np.uint64],
+        offsets: Places,
     ) -> None:
         """
         Write Message records that are encoded already as one chunk.
@@ -217,7 +213,7 @@ class McapWriter:
         for channel, rows in grouped(channels):
             entries = [log_times[rows].astype('<u8'), offsets[rows].astype('<u8')]
             self._index[channel] = [np.stack(entries, axis=1).tobytes()]
-            self._counts[channel] += len(rows)
+            self._ending.counts[channel] += len(rows)
         self._parts, self._size = [data], len(data)
         self._log_times = [int(log_times.min()), int(log_times.max())]
         self.end_chunk()
@@ -226,42 +222,25 @@ class McapWriter:
         """Compress and write the open chunk with its message index."""
         if not self._size:
             return
-        start, end = min(self._log_times), max(self._log_times)
-        self._times = (
-            (start, end)
-            if self._times is None
-            else (min(start, self._times[0]), max(end, self._times[1]))
-        )
+        times = min(self._log_times), max(self._log_times)
         content = b''.join(self._parts)
         packed = self._pack(content)
         at = self.position
         chunk = record(
             Op.CHUNK,
-            CHUNK.pack(start, end, len(content), crc32(content)),
+            CHUNK.pack(*times, len(content), crc32(content)),
             string('zstd'),
             struct.pack('<Q', len(packed)),
             packed,
         )
-        offsets = []
-        indexes = []
-        index_at = at + len(chunk)
-        for channel_id, entries in self._index.items() if self._message_index else ():
-            offsets.append(struct.pack('<HQ', channel_id, index_at))
-            indexes.append(
-                record(Op.MESSAGE_INDEX, struct.pack('<H', channel_id), string(b''.join(entries)))
-            )
-            index_at += len(indexes[-1])
-        self._write(chunk + b''.join(indexes))
-        self._chunk_index.append(
-            record(
-                Op.CHUNK_INDEX,
-                CHUNK_INDEX.pack(start, end, at, len(chunk)),
-                string(b''.join(offsets)),
-                struct.pack('<Q', sum(map(len, indexes))),
-                string('zstd'),
-                struct.pack('<QQ', len(packed), len(content)),
-            )
-        )
+        places, indexes = {}, b''
+        for channel, entries in self._index.items() if self._message_index else ():
+            places[channel] = at + len(chunk) + len(indexes)
+            pairs = string(b''.join(entries))
+            indexes += record(Op.MESSAGE_INDEX, struct.pack('<H', channel), pairs)
+        self._write(chunk + indexes)
+        sizes = len(packed), len(content)
+        self._ending.note_chunk(times, (at, len(chunk)), sizes, places, len(indexes))
         self._reset_chunk()
 
     def flush(self) -> None:
@@ -277,9 +256,9 @@ class McapWriter:
     def put_metadata(self, name: str, data: bytes) -> None:
         """Write a Metadata record that is encoded already."""
         self.end_chunk()
-        place = struct.pack('<QQ', self.position, len(data))
+        at = self.position
         self._write(data)
-        self._metadata_index.append(record(Op.METADATA_INDEX, place, string(name)))
+        self._ending.note_metadata(name, at, len(data))
 
     def put_attachment(self, about: Attachment, length: int, blocks: Iterable[bytes]) -> None:
         """
@@ -290,53 +269,12 @@ class McapWriter:
         :param blocks: its bytes, piece by piece.
         """
         self.end_chunk()
-        numbers = (self.position, length, about.log_time, about.create_time, about.data_size)
-        self._attachment_index.append(
-            record(
-                Op.ATTACHMENT_INDEX,
-                struct.pack('<QQQQQ', *numbers),
-                string(about.name),
-                string(about.media_type),
-            )
-        )
+        self._ending.note_attachment(about, self.position, length)
         for block in blocks:
             self._write(block)
 
     def finish(self) -> None:
         """Write the summary and the footer, all or nothing; the stream stays open."""
         self.end_chunk()
-        data_end = record(Op.DATA_END, struct.pack('<I', self._crc))
-        begin = self.position + len(data_end)
-        start, end = self._times or (0, 0)
-        counts = b''.join(struct.pack('<HQ', *entry) for entry in self._counts.items())
-        statistics = STATISTICS.pack(
-            self.message_count,
-            len(self._schemas),
-            len(self._channels),
-            len(self._attachment_index),
-            len(self._metadata_index),
-            len(self._chunk_index),
-            start,
-            end,
-        )
-        groups = {
-            Op.SCHEMA: [schema_record(schema) for schema in self._schemas],
-            Op.CHANNEL: [channel_record(channel) for channel in self._channels],
-            Op.STATISTICS: [record(Op.STATISTICS, statistics, string(counts))],
-            Op.CHUNK_INDEX: self._chunk_index,
-            Op.ATTACHMENT_INDEX: self._attachment_index,
-            Op.METADATA_INDEX: self._metadata_index,
-        }
-        summary = b''
-        offsets = b''
-        for op, members in groups.items():
-            if members:
-                group = b''.join(members)
-                where = struct.pack('<BQQ', op, begin + len(summary), len(group))
-                offsets += record(Op.SUMMARY_OFFSET, where)
-                summary += group
-        places = begin, begin + len(summary)
-        footer = HEAD.pack(Op.FOOTER, FOOTER.size) + struct.pack('<QQ', *places)
-        data = summary + offsets + footer
-        self._write(data_end + data + struct.pack('<I', crc32(data)) + MAGIC)
+        self._write(self._ending.records(self.position, self._crc))
         self._stream.flush()

@@ -189,18 +189,18 @@ def assign(
         elif header.name in _SCALED:
             signal, usual = _SCALED[header.name]
             own[signal] = Use(i, header.scale(signal) if header.unit else usual)
-    times, unit = _time_of(names)
+    time, scale = _time_of(names)
     for target, source in chosen.items():
         column = _find(names, target, source)
         given = source.scale if source.told else None
         if target in TIMES:
-            times, unit = (column,), given
+            time, scale = (column,), given
             if target == 'stamp':
-                unit = (given or Scale()).then(Scale(1 / SECOND))
+                scale = (given or Scale()).then(Scale(1 / SECOND))
         else:  # the user's factor counts from the raw numbers
             own[target] = Use(column, given or names[column].scale(target))
     if {'cv', 'x1'} <= own.keys():
-        return {'': Assignment(own, times, unit)}
+        return {'': Assignment(own, time, scale)}
     tagged = {}
     for number, tags in TAGS.items():
         columns = dict(own)
@@ -209,5 +209,5 @@ def assign(
             if tag:
                 columns[tags[tag][0]] = Use(i, tags[tag][1])
         if actuator in (None, number) and {'cv', 'x1'} <= columns.keys():
-            tagged[f'A{number}'] = Assignment(columns, times, unit)
+            tagged[f'A{number}'] = Assignment(columns, time, scale)
     return tagged

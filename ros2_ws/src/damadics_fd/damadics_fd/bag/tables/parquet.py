@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from damadics_fd.bag.arrays import Columns
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.mapping import Scale, Source
 from damadics_fd.bag.tables.headers import SECOND, Assignment, assign, headers
@@ -32,7 +33,7 @@ class ParquetTable(Table):
 
     names: tuple[str, ...] = ()
 
-    def chunks(self, on_problem: Told) -> Iterator[dict[str, np.ndarray]]:
+    def chunks(self, on_problem: Told) -> Iterator[Columns]:
         """
         Yield the columns in blocks of rows.
 

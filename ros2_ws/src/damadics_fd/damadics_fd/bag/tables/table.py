@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from damadics_fd.bag.arrays import Column, Columns
 from damadics_fd.bag.errors import BagError, NoMeasurementError
 from damadics_fd.bag.mapping import Scale, Source
 from damadics_fd.bag.tables.headers import LUBLIN, SECOND, Assignment, assign, headers
@@ -41,7 +42,7 @@ class Table:
     name: str
     assignment: Assignment
 
-    def chunks(self, on_problem: Told) -> Iterator[dict[str, np.ndarray]]:
+    def chunks(self, on_problem: Told) -> Iterator[Columns]:
         """
         Yield the columns in blocks of rows.
 
@@ -51,8 +52,8 @@ class Table:
         raise NotImplementedError
 
     def timed(
-        self, stamp: NDArray[np.float64], columns: Mapping[str, np.ndarray], where: str, tell: Told
-    ) -> dict[str, np.ndarray] | None:
+        self, stamp: NDArray[np.float64], columns: Mapping[str, Column], where: str, tell: Told
+    ) -> Columns | None:
         """Leave out the rows without a time [ns]; None where none has one."""
         good = np.isfinite(stamp) & (np.abs(np.nan_to_num(stamp)) < LAST_STAMP)
         if not good.all():
@@ -75,7 +76,7 @@ class TextTable(Table):
     layout: Layout
     start: int = 0
 
-    def chunks(self, on_problem: Told) -> Iterator[dict[str, np.ndarray]]:
+    def chunks(self, on_problem: Told) -> Iterator[Columns]:
         """
         Yield the columns in blocks of rows.
 

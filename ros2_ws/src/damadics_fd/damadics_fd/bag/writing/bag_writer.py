@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from damadics_fd.bag.arrays import Column
 from damadics_fd.bag.cdr.definition import schema_text, type_hash
 from damadics_fd.bag.cdr.layout import stamped_encoder
 from damadics_fd.bag.errors import BagError
@@ -192,7 +193,7 @@ class BagWriter:
     def write_columns(
         self,
         stamp: NDArray[np.int64],
-        messages: Mapping[str, Mapping[str, np.ndarray]],
+        messages: Mapping[str, Mapping[str, Column]],
         frame_id: str,
     ) -> None:
         """

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from damadics_fd.bag.arrays import Column
 from damadics_fd.bag.mapping import SIGNALS
 from damadics_fd.bag.rosbag2 import qos
 from damadics_fd.bag.writing.bag_writer import BagWriter
@@ -14,7 +15,7 @@ from damadics_fd.bag.writing.bag_writer import BagWriter
 
 def write_columns(
     path: str | Path,
-    columns: Mapping[str, np.ndarray],
+    columns: Mapping[str, Column],
     frame_id: str = 'LC74_20',
 ) -> None:
     """

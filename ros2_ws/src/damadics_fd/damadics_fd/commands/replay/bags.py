@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from damadics_fd.bag.cdr.decoder import Columns
+from damadics_fd.bag.arrays import Columns
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.recording import Recording
 from damadics_fd.causes import load_causes

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from damadics_fd.bag.arrays import Column
 from damadics_fd.bag.columns import iter_columns
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.recording import Recording
@@ -74,7 +75,7 @@ class FlagWriter:
         )
         self._write_flags(decisions)
 
-    def _write_flags(self, decisions: np.ndarray) -> None:
+    def _write_flags(self, decisions: Column) -> None:
         """Write the flag on every change and once a second."""
         keys = np.stack(
             [

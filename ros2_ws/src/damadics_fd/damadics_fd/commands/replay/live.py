@@ -19,7 +19,7 @@ from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Header
 from tqdm import tqdm
 
-from damadics_fd.bag.cdr.decoder import Columns
+from damadics_fd.bag.arrays import Columns
 from damadics_fd.bag.recording import Recording
 from damadics_fd.causes import explain, load_causes
 from damadics_fd.commands.replay.bags import Plan, joined
