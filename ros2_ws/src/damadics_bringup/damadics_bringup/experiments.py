@@ -249,7 +249,7 @@ def same_as_recorded(result: Result, topics: Mapping[str, Mapping[str, Any]]) ->
     estimate = topics['/estimate']
     for n, name in enumerate(('alpha1', 'alpha4', 'alpha5')):
         pairs.append((estimate['alpha_hat'][:, n], result.estimates[name][rows]))
-    for name in result.estimates.dtype.names:
+    for name in result.estimates.dtype.names or ():
         if name in estimate:
             pairs.append((estimate[name], result.estimates[name][rows]))
     return all(

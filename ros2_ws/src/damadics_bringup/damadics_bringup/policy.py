@@ -79,7 +79,7 @@ def policy(
     valves: Sequence[Valve],
     simulate: bool = False,
     processes: int = 0,
-) -> ET.ElementTree:
+) -> 'ET.ElementTree[ET.Element]':
     """
     Write down what each node of a fleet may do.
 

@@ -14,6 +14,7 @@ from damadics_msgs.srv import (
     ResetAlarm,
     Shelve,
 )
+from rclpy.client import Client
 from rclpy.node import Node
 
 from damadics_connect.watch import Watch, namespace_of, topic_of
@@ -45,7 +46,7 @@ class Actions:
     def __init__(self, node: Node, watch: Watch) -> None:
         self._node = node
         self._watch = watch
-        self._clients: dict[str, object] = {}
+        self._clients: dict[str, Client] = {}
 
     async def do(
         self,

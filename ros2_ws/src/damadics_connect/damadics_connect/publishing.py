@@ -24,8 +24,13 @@ class ValveName(NamedTuple):
 class Output(Protocol):
     """Takes samples; `flush` is called after each batch of them."""
 
-    samples: int
-    zero: set[str]  # valves whose p1, p2 and ps are all exactly 0
+    @property
+    def samples(self) -> int:
+        """Number of samples taken."""
+
+    @property
+    def zero(self) -> set[str]:
+        """Valves whose p1, p2 and ps are all exactly 0."""
 
     def send(self, valve: int, stamp: int, values: list[float]) -> None:
         """Take a sample: number of the valve, stamp [ns], the values of `SIGNALS`."""

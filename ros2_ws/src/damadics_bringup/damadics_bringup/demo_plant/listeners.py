@@ -84,7 +84,7 @@ async def mqtt_messages(port: int, journal: Journal) -> None:
     async with MqttClient('127.0.0.1', port) as client:
         await client.subscribe('damadics/+/event', qos=1)
         async for message in client.messages:
-            content = json.loads(bytes(message.payload))  # type: ignore[arg-type]
+            content = json.loads(bytes(message.payload))
             if content['transition'] == 'raised':
                 journal.alarm('MQTT message', content['valve'])
 

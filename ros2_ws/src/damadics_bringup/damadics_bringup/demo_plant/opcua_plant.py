@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 
 from asyncua import Node, Server, ua
+from damadics_connect.opcua.values import data_value, node_id
 from damadics_fd.ros.arguments import command_parser
 from damadics_plant import Simulator
 
@@ -47,11 +48,11 @@ class SimulatedValve:
         folder = await server.nodes.objects.add_object(space, self.tag)
         for signal_name, (end, _) in TAGS.items():
             node = await folder.add_variable(
-                ua.NodeId(f'{self.tag}.{end}', space), ua.QualifiedName(end, space), 0.0
+                node_id(f'{self.tag}.{end}', space), ua.QualifiedName(end, space), 0.0
             )
             self._nodes[signal_name] = node.nodeid
         self._fault = await folder.add_variable(
-            ua.NodeId(f'{self.tag}.Fault', space),
+            node_id(f'{self.tag}.Fault', space),
             ua.QualifiedName('Fault', space),
             0,
             ua.VariantType.Int32,
@@ -71,11 +72,8 @@ class SimulatedValve:
         for n, stamp in enumerate(columns['stamp'].tolist()):
             when = origin + timedelta(microseconds=stamp // 1000)
             for name, (_, factor) in TAGS.items():
-                value = ua.DataValue(
-                    ua.Variant(float(columns[name][n]) * factor, ua.VariantType.Double),
-                    SourceTimestamp=when,
-                    ServerTimestamp=when,
-                )
+                number = ua.Variant(float(columns[name][n]) * factor, ua.VariantType.Double)
+                value = data_value(number, when, when)
                 await write(self._nodes[name], ua.AttributeIds.Value, value)
 
 

@@ -81,7 +81,7 @@ async def serve(path: Path, ros_args: list[str]) -> int:
             )
         )
         server.install_signal_handlers = lambda: None  # type: ignore[attr-defined]
-        server.capture_signals = contextlib.nullcontext  # type: ignore[method-assign]
+        server.capture_signals = contextlib.nullcontext  # type: ignore[assignment]
         graph.node.get_logger().info(f'serving http://{host}:{port}/docs')
         task = asyncio.ensure_future(server.serve(sockets=[listener]))
         try:

@@ -3,7 +3,7 @@
 """Metrics for Prometheus: one time series per valve and quantity."""
 
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from damadics_fd.core.stamps import is_date
 from prometheus_client import CollectorRegistry
@@ -84,14 +84,22 @@ def _age(judgement: Judgement) -> float:
     return (time.time_ns() - judgement.stamp) * 1e-9
 
 
-def _gauge(name, text, valves, value):  # type: ignore[no-untyped-def]
+def _gauge(
+    name: str, text: str, valves: list[Judgement], value: Callable[[Judgement], float]
+) -> GaugeMetricFamily:
     family = GaugeMetricFamily(f'damadics_{name}', text, labels=LABELS)
     for judgement in valves:
         family.add_metric(_labels(judgement), value(judgement))
     return family
 
 
-def _choice(name, text, valves, choices, value):  # type: ignore[no-untyped-def]
+def _choice(
+    name: str,
+    text: str,
+    valves: list[Judgement],
+    choices: tuple[str, ...],
+    value: Callable[[Judgement], str],
+) -> GaugeMetricFamily:
     family = GaugeMetricFamily(f'damadics_{name}', text, labels=(*LABELS, name))
     for judgement in valves:
         now = value(judgement)

@@ -66,7 +66,8 @@ class EdgeNode:
                         await self._publish(client, listening)
                     finally:
                         listening.cancel()
-                        if asyncio.current_task().cancelling():  # type: ignore[union-attr]
+                        task = asyncio.current_task()
+                        if task is not None and task.cancelling():
                             await client.publish(self._topic('NDEATH'), death, qos=1)
             except (MqttError, OSError) as problem:
                 if not failures:
@@ -78,7 +79,7 @@ class EdgeNode:
     async def _listen(self, client: Client) -> None:
         async for message in client.messages:
             try:
-                payload = read_payload(bytes(message.payload)[:100_000])  # type: ignore[arg-type]
+                payload = read_payload(bytes(message.payload)[:100_000])
             except PayloadError:
                 continue
             self._rebirth |= any(m.name == REBIRTH and m.boolean_value for m in payload.metrics)
@@ -92,7 +93,7 @@ class EdgeNode:
                 self._rebirth = False
                 self._sequence = 0
                 self._sent.clear()
-                born = {'bdSeq': self._birth, REBIRTH: False}
+                born: dict[str, str | float | bool | int] = {'bdSeq': self._birth, REBIRTH: False}
                 await self._send(client, 'NBIRTH', '', born)
             for name, judgement in sorted(self._valves.items()):
                 device = name.replace('/', '_')

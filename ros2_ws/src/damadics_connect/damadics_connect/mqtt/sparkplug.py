@@ -9,7 +9,7 @@ carry fields that a reader does not know, and a valve has none of them.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from google.protobuf.message import DecodeError, Message
@@ -36,7 +36,12 @@ class PayloadError(ValueError):
     """The bytes are no Sparkplug B payload."""
 
 
-def _message(parent, name: str, fields, values_from: int = 0):  # type: ignore[no-untyped-def]
+def _message(
+    parent: Message,
+    name: str,
+    fields: Sequence[tuple[str, int, int, int, str]],
+    values_from: int = 0,
+) -> None:
     """Declare a message: (name, number, type, label, type name), then a oneof of values."""
     declared = parent.nested_type.add(name=name)
     if values_from:
@@ -53,7 +58,6 @@ def _message(parent, name: str, fields, values_from: int = 0):  # type: ignore[n
             label=_F.LABEL_OPTIONAL,
             oneof_index=0,
         )
-    return declared
 
 
 def _classes() -> tuple[type[Message], type[Message]]:
@@ -130,7 +134,7 @@ def read_payload(data: bytes) -> Message:
     return payload
 
 
-def number_of(metric) -> float:  # type: ignore[no-untyped-def]
+def number_of(metric: Message) -> float:
     """
     Return the value of a metric.
 
@@ -149,7 +153,7 @@ def number_of(metric) -> float:  # type: ignore[no-untyped-def]
     return float(value)
 
 
-def _quality(metric) -> int:  # type: ignore[no-untyped-def]
+def _quality(metric: Message) -> int:
     for key, value in zip(metric.properties.keys, metric.properties.values, strict=False):
         if key == 'Quality':
             return int(value.int_value)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from asyncua import ua
 from asyncua.crypto.permission_rules import SimpleRoleRuleset, User, UserRole
 from asyncua.server.internal_server import InternalServer
+from asyncua.server.user_managers import UserManager
 from damadics_fd.store.access import Access, Role
 
 
@@ -21,7 +22,7 @@ class Person(User):
 caller: ContextVar[User | None] = ContextVar('caller', default=None)
 
 
-class Doorman:
+class Doorman(UserManager):
     """
     Lets users in: the password of a user is a token.
 
@@ -53,7 +54,7 @@ class Rules(SimpleRoleRuleset):
     def check_validity(self, user: User, action_type_id: ua.NodeId, body: object) -> bool:
         """Tell whether a request is let through."""
         caller.set(user)
-        return bool(super().check_validity(user, action_type_id, body))
+        return bool(super().check_validity(user, action_type_id, body))  # type: ignore[no-untyped-call]
 
 
 def operator() -> User | None:

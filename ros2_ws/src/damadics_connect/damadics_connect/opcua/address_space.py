@@ -17,6 +17,7 @@ from asyncua import Node, Server, ua
 from damadics_fd.core.stamps import is_date
 
 from damadics_connect.judgement import CLASSES, Judgement
+from damadics_connect.opcua.values import data_value, node_id
 
 OWN = 'urn:damadics:fd'
 DI = 'http://opcfoundation.org/UA/DI/'
@@ -57,10 +58,10 @@ async def prepare(server: Server, nodesets: Sequence[Path]) -> Spaces:
     for path in nodesets:
         await server.import_xml(str(path))
     own, di, padim = [await server.register_namespace(uri) for uri in (OWN, DI, PADIM)]
-    standard = ua.NodeId(PADIM_TYPE, padim)
+    standard = node_id(PADIM_TYPE, padim)
     if standard in server.iserver.aspace:
         return Spaces(own, di, padim, standard)
-    base = server.get_node(ua.NodeId(ua.ObjectIds.BaseObjectType))
+    base = server.get_node(node_id(ua.ObjectIds.BaseObjectType))
     made = await base.add_object_type(standard, ua.QualifiedName('PADIMType', padim))
     for space, name, value in (
         (di, 'DeviceHealth', 0),
@@ -68,7 +69,7 @@ async def prepare(server: Server, nodesets: Sequence[Path]) -> Spaces:
         (padim, 'DateOfLastChange', datetime(1970, 1, 1, tzinfo=UTC)),
     ):
         member = await made.add_variable(
-            ua.NodeId(f'PADIMType.{name}', padim), ua.QualifiedName(name, space), value
+            node_id(f'PADIMType.{name}', padim), ua.QualifiedName(name, space), value
         )
         await member.set_modelling_rule(True)
     return Spaces(own, di, padim, standard)
@@ -101,13 +102,13 @@ class ValveObject:
         """
         spaces = self._spaces
         self.node = await parent.add_object(
-            ua.NodeId(valve, spaces.own),
+            node_id(valve, spaces.own),
             ua.QualifiedName(actuator or valve, spaces.own),
         )
         await set_type(self.node, spaces.type_id)
 
         async def variable(space: int, name: str, value: ua.Variant, under: Node) -> None:
-            nodeid = ua.NodeId(f'{valve}.{name}', spaces.own)
+            nodeid = node_id(f'{valve}.{name}', spaces.own)
             await under.add_variable(nodeid, ua.QualifiedName(name, space), value)
             self._nodes[name] = nodeid
 
@@ -116,12 +117,12 @@ class ValveObject:
         epoch = ua.Variant(datetime(1970, 1, 1, tzinfo=UTC), ua.VariantType.DateTime)
         await variable(spaces.padim, 'DateOfLastChange', epoch, self.node)
         counters = await self.node.add_object(
-            ua.NodeId(f'{valve}.OperationCounters', spaces.own),
+            node_id(f'{valve}.OperationCounters', spaces.own),
             ua.QualifiedName('OperationCounters', spaces.di),
         )
         await variable(spaces.di, 'OperationCycleCounter', ua.Variant(0, UINT32), counters)
         self.alarms = await self.node.add_folder(
-            ua.NodeId(f'{valve}.DeviceHealthAlarms', spaces.own),
+            node_id(f'{valve}.DeviceHealthAlarms', spaces.own),
             ua.QualifiedName('DeviceHealthAlarms', spaces.di),
         )
         for name in (*NUMBERS, *TRENDS):
@@ -178,12 +179,7 @@ class ValveObject:
     ) -> None:
         now = datetime.now(UTC)
         variant = ua.Variant(value, kind) if status == ua.StatusCodes.Good else ua.Variant()
-        shown = ua.DataValue(
-            variant,
-            ua.StatusCode(status),
-            SourceTimestamp=date_of(stamp) or now,
-            ServerTimestamp=now,
-        )
+        shown = data_value(variant, date_of(stamp) or now, now, status)
         before = self._shown.get(name)
         same = before is not None and (before.Value, before.StatusCode) == (
             shown.Value,
@@ -202,7 +198,7 @@ async def set_type(node: Node, type_id: ua.NodeId) -> None:
     :param type_id: its type.
     """
     await node.delete_reference(
-        ua.NodeId(ua.ObjectIds.BaseObjectType), ua.ObjectIds.HasTypeDefinition, True, False
+        node_id(ua.ObjectIds.BaseObjectType), ua.ObjectIds.HasTypeDefinition, True, False
     )
     await node.add_reference(type_id, ua.ObjectIds.HasTypeDefinition, True, False)
 

@@ -9,6 +9,8 @@ from typing import NamedTuple
 from asyncua import Client, Node, ua
 from damadics_fd.core.text import NAME, plain
 
+from damadics_connect.opcua.values import node_id
+
 MOST = 100_000  # nodes looked at
 DEEPEST = 12  # levels of folders
 AT_ONCE = 200  # nodes of one request
@@ -102,9 +104,7 @@ async def variables_of(client: Client) -> list[Variable]:
             results = await client.browse_nodes([node for node, _ in some_of])
             for (_, path), (_, result) in zip(some_of, results, strict=True):
                 for reference in result.References or ():
-                    nodeid = ua.NodeId(
-                        reference.NodeId.Identifier, reference.NodeId.NamespaceIndex
-                    )
+                    nodeid = node_id(reference.NodeId.Identifier, reference.NodeId.NamespaceIndex)
                     if nodeid in seen or not nodeid.NamespaceIndex or len(seen) > MOST:
                         continue
                     seen.add(nodeid)

@@ -55,7 +55,7 @@ async def connect(path: Path, ros_args: list[str]) -> int:
     from damadics_connect.opcua.session import read_endpoint
     from damadics_connect.opcua.source import Source
     from damadics_connect.opcua.wire import keep_bytes
-    from damadics_connect.publishing import output_of
+    from damadics_connect.publishing import Output, output_of
     from damadics_connect.valve_list import read_valves
 
     config = read_config(path)
@@ -79,7 +79,7 @@ async def connect(path: Path, ros_args: list[str]) -> int:
     try:
         if endpoint is not None:
             keep_bytes()
-            output = output_of(publish, graph.node, names)
+            output: Output = output_of(publish, graph.node, names)
             if serve is not None:
                 output = cycles = Cycles(output, names, state_folder() / 'cycles.json')
             source = Source(endpoint, valves, options, output, log)

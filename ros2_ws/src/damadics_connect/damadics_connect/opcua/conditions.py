@@ -10,6 +10,7 @@ from asyncua.server.event_generator import EventGenerator
 from damadics_connect.judgement import Judgement
 from damadics_connect.opcua.access import operator
 from damadics_connect.opcua.address_space import ValveObject, date_of, set_type
+from damadics_connect.opcua.values import node_id, status_of
 
 SEVERITY = {  # 1..1000 (OPC 10000-5, 6.4.2)
     'normal': 100,
@@ -18,7 +19,7 @@ SEVERITY = {  # 1..1000 (OPC 10000-5, 6.4.2)
     'out_of_specification': 700,
     'failure': 900,
 }
-ACKNOWLEDGE = ua.NodeId(ua.ObjectIds.AcknowledgeableConditionType_Acknowledge)
+ACKNOWLEDGE = node_id(ua.ObjectIds.AcknowledgeableConditionType_Acknowledge)
 ALARMED = ('alarm', 'latched', 'shelved', 'unknown')
 Acknowledge = Callable[[str, int, str, str], Awaitable[bool]]
 
@@ -42,17 +43,17 @@ class Condition:
     async def make(self, server: Server, valve_object: ValveObject, space: int) -> None:
         """Make the condition's node and what sends its events."""
         self.node = await valve_object.alarms.add_object(
-            ua.NodeId(f'{self.valve}.Alarm', space),
+            node_id(f'{self.valve}.Alarm', space),
             ua.QualifiedName('Alarm', space),
         )
-        await set_type(self.node, ua.NodeId(ua.ObjectIds.AlarmConditionType))
+        await set_type(self.node, node_id(ua.ObjectIds.AlarmConditionType))
         self._generator = await server.get_event_generator(
             ua.ObjectIds.AlarmConditionType, ua.ObjectIds.Server
         )
         event = self._generator.event
         event.NodeId = self.node.nodeid
         event.ConditionName = 'Alarm'
-        event.ConditionClassId = ua.NodeId(ua.ObjectIds.MaintenanceConditionClassType)
+        event.ConditionClassId = node_id(ua.ObjectIds.MaintenanceConditionClassType)
         event.ConditionClassName = ua.LocalizedText('Maintenance')
         event.BranchId = ua.NodeId()
         event.SourceNode = valve_object.node.nodeid
@@ -90,7 +91,7 @@ class Condition:
         event.Severity = SEVERITY[judgement.ne107]
         event.Retain = self.retained
         lost = judgement.state in ('not_monitored', 'unknown')
-        event.Quality = ua.StatusCode(
+        event.Quality = status_of(
             ua.StatusCodes.UncertainLastUsableValue if lost else ua.StatusCodes.Good
         )
         setattr(event, 'ActiveState/Id', active)
@@ -135,14 +136,14 @@ class Conditions:
         user = operator()
         condition = self.of.get(parent)
         if user is None:
-            return ua.StatusCode(ua.StatusCodes.BadUserAccessDenied)
+            return status_of(ua.StatusCodes.BadUserAccessDenied)
         if condition is None:
-            return ua.StatusCode(ua.StatusCodes.BadNodeIdInvalid)
+            return status_of(ua.StatusCodes.BadNodeIdInvalid)
         if event_id.Value != condition.event_id:
-            return ua.StatusCode(ua.StatusCodes.BadEventIdUnknown)
+            return status_of(ua.StatusCodes.BadEventIdUnknown)
         if condition.judgement.acknowledged or not condition.retained:
-            return ua.StatusCode(ua.StatusCodes.BadConditionBranchAlreadyAcked)
+            return status_of(ua.StatusCodes.BadConditionBranchAlreadyAcked)
         text = comment.Value.Text if isinstance(comment.Value, ua.LocalizedText) else ''
         occurrence = condition.judgement.occurrence
         done = await self._acknowledge(condition.valve, occurrence, user.name or '', text or '')
-        return ua.StatusCode(ua.StatusCodes.Good if done else ua.StatusCodes.BadInvalidState)
+        return status_of(ua.StatusCodes.Good if done else ua.StatusCodes.BadInvalidState)

@@ -19,6 +19,7 @@ from damadics_connect.judgement import NANO
 from damadics_connect.opcua.access import Doorman, Rules
 from damadics_connect.opcua.address_space import ValveObject, prepare
 from damadics_connect.opcua.conditions import Condition, Conditions
+from damadics_connect.opcua.values import node_id
 from damadics_connect.process import ConnectError
 from damadics_connect.settings import Section
 from damadics_connect.watch import Watch, topic_of
@@ -111,7 +112,8 @@ class Judgements:
             policies = [ua.SecurityPolicyType.Basic256Sha256_SignAndEncrypt]
             await server.load_certificate(str(settings.certificate))
             await server.load_private_key(str(settings.key))
-        server.set_security_policy(policies, permission_ruleset=Rules())
+        rules = Rules()  # type: ignore[no-untyped-call]
+        server.set_security_policy(policies, permission_ruleset=rules)
         if not settings.access.open:
             server.set_identity_tokens([ua.UserNameIdentityToken])
         try:
@@ -124,7 +126,7 @@ class Judgements:
         conditions = Conditions(server, self._acknowledge)
         conditions.prepare()
         folder = await server.nodes.objects.add_folder(
-            ua.NodeId('Valves', spaces.own), ua.QualifiedName('Valves', spaces.own)
+            node_id('Valves', spaces.own), ua.QualifiedName('Valves', spaces.own)
         )
         try:
             await server.start()

@@ -22,6 +22,7 @@ from damadics_connect.opcua.session import (
     open_session,
     why,
 )
+from damadics_connect.opcua.values import status_of
 from damadics_connect.opcua.wire import Changes, WireError, read_changes
 from damadics_connect.publishing import Output
 from damadics_connect.settings import shown
@@ -127,7 +128,7 @@ class Source:
         if self._unknown:
             self._log(f'no such node: {some([f"{n} ({c})" for n, c in self._unknown.items()])}')
         tick = min(feed.tick for feed in self._feeds)
-        due = dict.fromkeys(range(len(self._feeds)), 0.0)
+        due = [0.0] * len(self._feeds)
         try:
             while True:
                 asleep = time.monotonic()
@@ -149,8 +150,8 @@ class Source:
                     if task.done():
                         task.result()
                 for number, feed in enumerate(self._feeds):
-                    if (now := time.monotonic()) >= due[number]:
-                        due[number] = now + feed.tick
+                    if (moment := time.monotonic()) >= due[number]:
+                        due[number] = moment + feed.tick
                         feed.look(time.monotonic_ns())
                 self._output.flush()
         finally:
@@ -216,7 +217,7 @@ class Source:
         for notification in result.NotificationMessage.NotificationData or ():
             if isinstance(notification, ua.ExtensionObject):
                 try:
-                    changes = read_changes(notification.Body)
+                    changes = read_changes(notification.Body or b'')
                 except WireError:
                     self._garbled += 1
                     continue
@@ -253,7 +254,7 @@ class Source:
         if quality == UNCERTAIN:
             tally.uncertain[name] = tally.uncertain.get(name, 0) + 1
         if quality not in (0, UNCERTAIN):
-            tally.bad[name] = ua.StatusCode(status).name
+            tally.bad[name] = status_of(status).name
             return float('nan')
         if kind:
             tally.bad[name] = f'{kind} where a number is expected'
@@ -279,15 +280,13 @@ class Source:
                 stamp = nanoseconds_of(result.SourceTimestamp) or nanoseconds_of(
                     result.ServerTimestamp
                 )
-                row = (
+                changes.add(
                     handle,
-                    float(value) if number else float('nan'),
+                    float(value) if isinstance(value, int | float) else float('nan'),
                     result.StatusCode.value if result.StatusCode else 0,
                     stamp,
                     '' if number else type(value).__name__,
                 )
-                for column, cell in zip(changes, row, strict=True):
-                    column.append(cell)
             self._take_changes(feed, changes, None)
             due = max(due + feed.period, time.monotonic() - feed.period)
             await asyncio.sleep(max(0.0, due - time.monotonic()))

@@ -16,6 +16,8 @@ from asyncua.common.utils import Buffer
 from asyncua.ua.ua_binary import variant_from_binary
 from numpy.typing import NDArray
 
+from damadics_connect.opcua.values import node_id
+
 UNIX = 116_444_736_000_000_000  # 1970 in intervals of 100 ns since 1601
 VALUE, STATUS, SOURCE, SERVER, SOURCE_PICO, SERVER_PICO = (1 << n for n in range(6))
 NUMBERS = {
@@ -38,7 +40,7 @@ FORMATS = {1: '<?', 2: '<b', 3: '<B', 4: '<h', 5: '<H', 6: '<i', 7: '<I'} | {
     11: '<d',
 }
 LEAST_ROWS = 8  # from where columns are faster than rows
-DATA_CHANGE = ua.NodeId(ua.ObjectIds.DataChangeNotification_Encoding_DefaultBinary)
+DATA_CHANGE = node_id(ua.ObjectIds.DataChangeNotification_Encoding_DefaultBinary)
 
 
 class Changes(NamedTuple):
@@ -49,6 +51,14 @@ class Changes(NamedTuple):
     status: list[int]  # status code; 0: good
     stamp: list[int]  # source time [ns since 1970], 0: none
     kind: list[str]  # '' for a number, else what came instead
+
+    def add(self, handle: int, value: float, status: int, stamp: int, kind: str) -> None:
+        """Add one row."""
+        self.handle.append(handle)
+        self.value.append(value)
+        self.status.append(status)
+        self.stamp.append(stamp)
+        self.kind.append(kind)
 
 
 class WireError(ValueError):
@@ -115,7 +125,8 @@ def _nanoseconds(rows: NDArray[np.void], ticks_of: str, fine_of: str) -> list[in
     ns = (ticks - UNIX) * 100
     if fine_of in (rows.dtype.names or ()):
         ns = ns + rows[fine_of] // 100  # in units of 10 ps
-    return np.where((ticks > UNIX) & (ticks < 2 * UNIX), ns, 0).tolist()
+    known: list[int] = np.where((ticks > UNIX) & (ticks < 2 * UNIX), ns, 0).tolist()
+    return known
 
 
 def _one_by_one(body: bytes, count: int) -> Changes:
@@ -150,8 +161,5 @@ def _one_by_one(body: bytes, count: int) -> Changes:
                 at += 2
             ns = (ticks - UNIX) * 100 + fine // 100 if UNIX < ticks < 2 * UNIX else 0
             source, server = (ns, server) if not which else (source, ns)
-        for column, item in zip(
-            changes, (handle, value, status, source or server, word), strict=True
-        ):
-            column.append(item)
+        changes.add(handle, value, status, source or server, word)
     return changes
