@@ -13,6 +13,7 @@ class Limits:
     :param record: content of one record that is kept in memory [B].
     :param chunk: decompressed chunk [B].
     :param messages: in one chunk.
+    :param message: one that is compressed by itself, decompressed [B].
     :param ratio: decompressed over compressed size of a chunk; zstd cannot exceed it by much.
     :param dense: a chunk that holds more bytes for each of its compressed ones is dense; our
         writer writes none.
@@ -21,7 +22,8 @@ class Limits:
     :param channels: in one file.
     :param attachments: attachments and metadata records in one file.
     :param yaml: `metadata.yaml` or a text of quality of service [B].
-    :param unpacked: a file that is compressed as a whole: so many bytes whatever its size,
+    :param unpacked: a file that is compressed as a whole or message by message: so many bytes
+        whatever its size,
     :param unpacked_ratio: and so many more for each of its bytes.
     :param problems: number of damaged places after which the rest is given up.
     """
@@ -29,6 +31,7 @@ class Limits:
     record: int = 1 << 28
     chunk: int = 1 << 28
     messages: int = 1 << 22
+    message: int = 1 << 26
     ratio: int = 1 << 17
     dense: int = 300
     total: int = 3 << 29

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damadics_fd.bag.cdr import kernels
+from damadics_fd.bag.compressed import Unpacker, is_compressed
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.grouping import grouped
 from damadics_fd.bag.limits import Limits
@@ -40,6 +41,7 @@ class Batch:
     :param starts: place of the data of each message.
     :param sizes: size of the data of each message [B].
     :param offset: place of the chunk in the file.
+    :param places: of the Message records in the chunk as the file has it.
     """
 
     data: NDArray[np.uint8]
@@ -48,6 +50,7 @@ class Batch:
     starts: NDArray[np.int64]
     sizes: NDArray[np.int64]
     offset: int
+    places: NDArray[np.int64]
 
     def log_times(self, rows: NDArray[np.generic] | slice = slice(None)) -> NDArray[np.int64]:
         """Return the log times of some messages [ns]."""
@@ -56,6 +59,11 @@ class Batch:
     def by_channel(self) -> Iterator[tuple[int, NDArray[np.int64]]]:
         """Yield the channels that have messages, each with the rows of these in order."""
         yield from grouped(self.channels)
+
+    def beginning(self, row: int) -> bytes:
+        """Return the first bytes of one message."""
+        start = self.starts[row]
+        return self.data[start : start + min(self.sizes[row], 4)].tobytes()
 
     def message(self, row: int) -> bytes:
         """Return one serialised message."""
@@ -86,6 +94,8 @@ class MessageFile(ABC):
         self._given_up = False
         self._text = 0
         self._once: set[str] = set()
+        size = self.path.stat().st_size if self.path.is_file() else 0
+        self._unpack = Unpacker(limits, size)
 
     def __enter__(self) -> Self:
         """Return the file."""
@@ -188,7 +198,44 @@ class MessageFile(ABC):
             self.problem(at, f'a chunk holds more than {most} messages: the rest of it is left')
         elif end != len(data):
             self.problem(at, 'a chunk ends in the middle of a record')
-        return Batch(data, words, channels[:n], starts[:n], sizes[:n], at)
+        places = starts[:n] - MESSAGE_HEAD
+        batch = Batch(data, words, channels[:n], starts[:n], sizes[:n], at, places)
+        return self._plain(batch) if n and is_compressed(batch.beginning(0)) else batch
+
+    def _plain(self, batch: Batch) -> Batch:
+        """Decompress messages that are compressed one by one; those that cannot be are told."""
+        kept: list[int] = []
+        parts: list[bytes] = []
+        told: list[str] = []
+        total = 0
+        for row, place in enumerate(batch.places.tolist()):
+            try:
+                message = self._unpack(batch.message(row))
+                if total + len(message) > self.limits.chunk:
+                    raise BagError('a chunk of compressed messages is beyond the limit')
+            except BagError as error:
+                told.append(error.reason)
+                continue
+            total += len(message)
+            kept.append(row)
+            head = HEAD.pack(Op.MESSAGE, MESSAGE_HEAD - HEAD.size + len(message))
+            rest = batch.data[place + HEAD.size : place + MESSAGE_HEAD].tobytes()
+            parts += [head + rest, message]
+        if told:
+            self.problem(batch.offset, f'{len(told)} messages are lost: {told[0]}')
+        data = np.frombuffer(bytearray().join(parts) or bytearray(1), np.uint8)
+        sizes = np.array([len(part) for part in parts[1::2]], np.int64)
+        ends = np.cumsum(sizes + MESSAGE_HEAD)
+        rows = np.array(kept, np.int64)
+        return Batch(
+            data,
+            kernels.words(data),
+            batch.channels[rows],
+            ends - sizes,
+            sizes,
+            batch.offset,
+            batch.places[rows],
+        )
 
     def note_record(self, op: Op, content: bytes) -> None:
         """

@@ -11,10 +11,10 @@ from itertools import chain
 from pathlib import Path
 
 import numpy as np
-import zstandard
 from numpy.typing import NDArray
 
 from damadics_fd.bag.cdr.definition import schema_text
+from damadics_fd.bag.compressed import is_compressed
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.limits import Limits
 from damadics_fd.bag.mcap.records import HEAD, Channel, Op, Schema, message_dtype
@@ -24,6 +24,7 @@ from damadics_fd.bag.messages import MESSAGE_HEAD, MessageFile
 MAGIC = b'SQLite format 3\0'
 CHUNK = 1 << 20  # [B] of messages handled at a time
 MOST_ROWS = 20_000  # fetched at a time
+UNPACKED = 1 << 24  # [B] of compressed messages from which on they are handled
 STEPS = 1_000_000  # of the database between two looks at the budget
 STEPS_PER_BYTE = 200  # of the file, that any query may take
 BESIDE = ('-wal', '-journal')  # what a writer that did not end leaves beside the file
@@ -51,7 +52,6 @@ class SqliteFile(MessageFile):
         self._numbers: dict[int, int] = {}  # channels by the id of the topic
         self._counts: dict[int, int] | None = None
         self._steps = 0
-        self._unpack = zstandard.ZstdDecompressor()
         try:
             self._database = self._open()
             self._read_topics()
@@ -72,7 +72,7 @@ class SqliteFile(MessageFile):
             self._folder = None
 
     def _open(self) -> sqlite3.Connection:
-        source = self._plain()
+        source = self._readable_file()
         if self._folder:
             uri = f'{source.as_uri()}?mode=rw'  # our copy, into which the log may be merged
         else:
@@ -92,7 +92,7 @@ class SqliteFile(MessageFile):
         database.set_progress_handler(spend, STEPS)
         return database
 
-    def _plain(self) -> Path:
+    def _readable_file(self) -> Path:
         """Return the database itself, or a copy of it with what a writer left beside it."""
         with self.path.open('rb') as stream:
             if stream.read(4) == ZSTD_MAGIC:
@@ -189,9 +189,10 @@ class SqliteFile(MessageFile):
             try:
                 for rows in self._blocks(following):
                     last = rows[-1][0]
-                    data = self._encoded(rows)
-                    if len(data):
-                        yield rows[0][0], data
+                    for part in self._parts(rows):
+                        data = self._encoded(part)
+                        if len(data):
+                            yield part[0][0], data
                 return
             except sqlite3.Error as error:
                 self.problem(last, f'the database is damaged: {error}')
@@ -225,6 +226,25 @@ class SqliteFile(MessageFile):
         except sqlite3.Error:
             return False
 
+    def _parts(self, rows: list[Row]) -> Iterator[list[Row]]:
+        """Part rows that get large when they are decompressed."""
+        if not any(isinstance(row[3], bytes) and is_compressed(row[3]) for row in rows):
+            yield rows
+            return
+        part: list[Row] = []
+        total = 0
+        for row in rows:
+            part.append(row)
+            try:
+                total += self._unpack.size(row[3])
+            except (BagError, TypeError):
+                continue  # told where it is decompressed
+            if total > UNPACKED:
+                yield part
+                part, total = [], 0
+        if part:
+            yield part
+
     def _encoded(self, rows: Sequence[Row]) -> NDArray[np.uint8]:
         """Return rows as Message records one after the other."""
         _, topics, stamps, payloads = zip(*rows, strict=True)
@@ -232,7 +252,7 @@ class SqliteFile(MessageFile):
             ids, times = np.array(topics, np.int64), np.array(stamps, np.int64)
             data = [self._message(payload) for payload in payloads]
             numbers = np.array([self._numbers[topic] for topic in ids.tolist()], np.uint16)
-        except (TypeError, ValueError, OverflowError, KeyError, zstandard.ZstdError):
+        except (TypeError, ValueError, OverflowError, KeyError, BagError):
             good = [row for row in rows if self._is_good(row)]
             lost = len(rows) - len(good)
             if not lost:
@@ -254,19 +274,14 @@ class SqliteFile(MessageFile):
         """Return a message, decompressed where the bag was compressed message by message."""
         if not isinstance(payload, bytes):
             raise TypeError
-        if payload[:4] != ZSTD_MAGIC:  # no CDR begins like this
-            return payload
-        size = zstandard.frame_content_size(payload)
-        if size > self.limits.chunk:
-            raise ValueError
-        return self._unpack.decompress(payload, max_output_size=max(size, 1 << 24))
+        return self._unpack(payload)
 
     def _is_good(self, row: Row) -> bool:
         _, topic, stamp, payload = row
         try:
             struct.pack('<qq', topic, stamp)
             self._message(payload)
-        except (TypeError, ValueError, struct.error, zstandard.ZstdError):
+        except (TypeError, ValueError, struct.error, BagError):
             return False
         return topic in self._numbers
 

@@ -3,27 +3,36 @@
 """
 Mutations of bags that know the structure of MCAP: no traceback, no hang, no silent loss.
 
-`make fuzz` runs thousands with the seeds of today; the tests run some with a fixed seed.
+`make fuzz` runs thousands with the seeds of today; the tests run some with a fixed seed. Every
+third mutation goes through the commands, the others through what these are made of.
 """
 
+import contextlib
+import io
+import json
 import os
 import random
 import struct
 import time
+from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from damadics_fd.bag import BagError, BagWriter, iter_columns, write_columns
-from damadics_fd.bag.checking.inspection import UNUSABLE, WHOLE, inspect
+from damadics_fd.bag.checking.inspection import LOSSY, UNUSABLE, WHOLE, inspect
 from damadics_fd.bag.mcap.records import HEAD, MAGIC
 from damadics_fd.bag.salvage import salvage
+from damadics_fd.commands import recover, verify
+from damadics_fd.commands.replay import replay
 
 from .bag_support import needs_messages, simulated
 from .test_conformance import Maker
 from .test_damage import small_bag
 
 pytestmark = needs_messages
-FIXED, COUNT = 14, 300
+FIXED, COUNT = 14, 300  # 3 and 5 have no common divisor: all bags come to the commands
+EVERY = 3  # mutation goes through the commands
 SECONDS = 10.0  # of the processor, for one mutation
 
 
@@ -98,16 +107,19 @@ def messages(path: Path) -> dict[str, int]:
     return {name: topic.count for name, topic in inspect(path).topics.items() if topic.count}
 
 
+def assert_unharmed(data: bytes, original: bytes, note: str) -> None:
+    """Assert that a file that was called whole is: a CRC of zero means "not computed"."""
+    changed = [i for i, (a, b) in enumerate(zip(data, original, strict=False)) if a != b]
+    assert len(data) == len(original), note
+    assert all(data[i] == 0 for i in changed) and len(changed) <= 4, note
+
+
 def judge(path: Path, original: bytes, counts: dict[str, int], out: Path, note: str) -> None:
     """Run everything over one mutation and compare what it says with what is there."""
     data = path.read_bytes()
-    began = time.process_time()
     report = inspect(path)
     if report.code == WHOLE and data != original:
-        changed = [i for i, (a, b) in enumerate(zip(data, original, strict=False)) if a != b]
-        # a CRC of zero means "not computed": nothing else may have changed
-        assert len(data) == len(original), note
-        assert all(data[i] == 0 for i in changed) and len(changed) <= 4, note
+        assert_unharmed(data, original, note)
     result = salvage(path, out)
     if result.saved:
         assert messages(out) == {n: t.count for n, t in result.saved.topics.items() if t.count}
@@ -124,7 +136,61 @@ def judge(path: Path, original: bytes, counts: dict[str, int], out: Path, note: 
             continue
         found = sum(len(part['log_time']) for part in parts)
         assert found == count or told, f'{note}: {topic} gives {found} of {count}, and no word'
-    assert time.process_time() - began < SECONDS, note
+
+
+def run(command: Callable[[list[str]], int], *args: object) -> tuple[int, str, str]:
+    """Run a command; return its exit code and what it printed."""
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        code = command([str(arg) for arg in args])
+    return code, out.getvalue(), err.getvalue()
+
+
+def read_by_others(path: Path) -> Counter[str]:
+    """Count messages by topic with the reference library."""
+    reader = pytest.importorskip('mcap.reader')
+    with path.open('rb') as stream:
+        made = reader.make_reader(stream, validate_crcs=True)
+        return Counter(channel.topic for _, channel, _ in made.iter_messages())
+
+
+def assert_container_whole(path: Path, note: str) -> None:
+    """Assert that nothing is wrong with a saved file but what its messages say themselves."""
+    _, shown, _ = run(verify.main, path, '--json')
+    (report,) = json.loads(shown)
+    said = ('stamps', 'definition', 'is encoded as')
+    assert all(any(word in text for word in said) for text in report['problems']), (note, report)
+
+
+def judge_commands(
+    path: Path, original: bytes, counts: dict[str, int], out: Path, note: str
+) -> None:
+    """Run verify, recover and replay over one mutation as a user does."""
+    code, shown, err = run(verify.main, path, '--json')
+    (report,) = json.loads(shown)
+    assert report['verdict'] == {WHOLE: 'whole', LOSSY: 'lossy', UNUSABLE: 'unusable'}[code], note
+    data = path.read_bytes()
+    if code == WHOLE and data != original:
+        assert_unharmed(data, original, note)
+    readable = report['messages']
+    code, shown, err = run(recover.main, path, '--out', out)
+    assert code in (WHOLE, LOSSY, UNUSABLE), note
+    if out.exists():
+        saved = read_by_others(out)
+        assert f'saved {saved.total()} messages' in shown, note
+        assert saved.total() >= readable, note
+        assert_container_whole(out, note)
+        out.unlink()
+    else:
+        assert code == UNUSABLE, note
+    result = path.with_name('result.json')
+    code, shown, err = run(replay.main, path, '--mode', 'paper', '--jobs', 1, '--out', result)
+    for outcome in json.loads(result.read_text()) if result.exists() else []:
+        found, expected = outcome['samples'], counts.get('/measurement', 0)
+        if code == 0 and data != original:
+            assert found == expected, f'{note}: {found} of {expected} replayed, and no word'
+        assert outcome['error'] or found == expected or 'warning' in err, note
+    result.unlink(missing_ok=True)
 
 
 def fuzz(folder: Path, seed: int, count: int) -> None:
@@ -137,7 +203,11 @@ def fuzz(folder: Path, seed: int, count: int) -> None:
             data = mutated(data, rng)
         path = folder / 'mutation.mcap'
         path.write_bytes(data)
-        judge(path, original, counts, folder / 'saved.mcap', f'{name}, seed {seed}, {number}')
+        note = f'{name}, seed {seed}, {number}'
+        examine = judge if number % EVERY else judge_commands
+        began = time.process_time()
+        examine(path, original, counts, folder / 'saved.mcap', note)
+        assert time.process_time() - began < SECONDS, note
 
 
 def test_mutations_with_a_fixed_seed(tmp_path):

@@ -14,6 +14,7 @@ from damadics_fd.bag.cdr.definition import Definition, parse_definition
 from damadics_fd.bag.cdr.groups import Alike, first_message
 from damadics_fd.bag.cdr.kernels import LOG_TIME, Words
 from damadics_fd.bag.cdr.layout import Layout, Place, layout_of
+from damadics_fd.bag.compressed import is_compressed
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.messages import Batch, MessageFile
 
@@ -133,6 +134,8 @@ class Decoder:
         """Return how to decode messages that are like the first one of a chunk."""
         if not self._alike and (found := first_message(data, self._number)):
             start, size = found
+            if is_compressed(data[start : start + 4].tobytes()):
+                return None
             layout = self._layout(data[start : start + size])
             self._alike = Alike.of(layout, size, self._places(layout))
         return self._alike

@@ -9,7 +9,7 @@ import numpy as np
 
 from damadics_fd.bag.mcap.records import HEAD, Extent, Op
 from damadics_fd.bag.mcap.summary import Indexed, Summary
-from damadics_fd.bag.messages import MESSAGE_HEAD, Batch
+from damadics_fd.bag.messages import Batch
 
 Read = Callable[[int, int], bytes]  # place, size
 Tell = Callable[[int, str], None]  # place, what is wrong there
@@ -32,7 +32,7 @@ def check_message_index(read: Read, tell: Tell, indexed: Indexed, batch: Batch) 
     none = np.empty(0, np.int64)
     for number, at in indexed.messages.items():
         rows = parts.get(number, none)
-        places = batch.starts[rows] - MESSAGE_HEAD
+        places = batch.places[rows]
         pairs = np.stack([batch.log_times(rows), places], axis=1).astype('<u8')
         content = struct.pack('<HI', number, pairs.nbytes)
         found = read(at, HEAD.size + len(content) + pairs.nbytes)
