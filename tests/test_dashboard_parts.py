@@ -9,10 +9,13 @@ import sqlite3
 import numpy as np
 import pytest
 from damadics_dashboard.dashboard import main, read_tokens
+from damadics_dashboard.live.fleet import FleetReport, shared
 from damadics_dashboard.live.raw import Batch
+from damadics_dashboard.live.record import ACTIONS
 from damadics_dashboard.live.traces import NANO, Trace, envelope
 from damadics_dashboard.live.valve import Valve
 from damadics_dashboard.pages.fleet_page import tile
+from damadics_dashboard.pages.playback import settings_in_file
 from damadics_dashboard.pages.valve_words import alarm_words
 from damadics_dashboard.server.access import COOKIE, Guard, check_binding
 from damadics_dashboard.server.limits import SizeLimit
@@ -20,8 +23,9 @@ from damadics_dashboard.store.export import cell
 from damadics_dashboard.store.history import History, Wanted
 from damadics_dashboard.words.templates import TEMPLATES, render
 from damadics_dashboard.words.texts import texts
+from damadics_fd.core.settings import SettingsError
 from damadics_fd.store.access import Access, AccessError, Grant, Role
-from damadics_msgs.msg import FaultEvent, FaultFlag, Isolation, Measurement
+from damadics_msgs.msg import FaultEvent, FaultFlag, FleetLayout, Isolation, Measurement
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rclpy.serialization import serialize_message
@@ -202,6 +206,31 @@ def test_every_language_has_every_text_with_the_same_values():
 def test_a_spreadsheet_runs_no_text_of_the_export():
     assert cell('=HYPERLINK("http://evil")').startswith("'=")
     assert cell('+1') == "'+1" and cell(-1.5) == -1.5 and cell(None) is None
+
+
+def test_a_valve_of_a_fleet_is_acted_on_through_its_fleet():
+    report = FleetReport(lambda name: known.setdefault(name, Valve(name)), '/plant/fleet')
+    known: dict[str, Valve] = {}
+    report.take_layout(FleetLayout(valve=['/unit/lv1'], actuator=['LV-1'], area=['unit']))
+    valve = known['unit/lv1']
+    for service in ACTIONS[:6]:
+        name, kind, fields = shared(valve.fleet, service)
+        assert name.startswith('/plant/fleet/')
+        request = kind.Request(**fields, user='Anna', comment='seen')
+        assert request.valves == ['/unit/lv1'], 'as the fleet lists it'
+    assert shared(valve.fleet, 'load_reference')[2]['save'] is False
+
+
+def test_the_file_of_commission_is_read_for_a_replay_and_nonsense_is_refused():
+    text = '/**:\n  ros__parameters: {mode: monitor, actuator: LV-1, stiffness: 160000.0}\n'
+    assert settings_in_file(text)['stiffness'] == 160000.0
+    for bad, said in (
+        ('[1, 2', 'no parameter file'),
+        ('a: 1', '.+'),
+        ('/**:\n  ros__parameters: {stiffness: -1.0}\n', 'stiffness'),
+    ):
+        with pytest.raises(SettingsError, match=said):
+            settings_in_file(bad)
 
 
 def test_the_alarm_is_acknowledged_by_event_or_by_diagnostics_after_a_restart():

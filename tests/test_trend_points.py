@@ -12,7 +12,8 @@ from damadics_dashboard.live.valve import Valve
 from damadics_dashboard.words.outlook import outlook_words
 from damadics_dashboard.words.texts import texts
 from damadics_fd.store.intervals import DAY, Intervals
-from damadics_msgs.msg import Signature
+from damadics_fd.store.trends import TrendFile
+from damadics_msgs.msg import FaultFlag, Signature
 
 
 def test_motion_counts_travel_reversals_and_full_strokes_and_no_noise():
@@ -47,6 +48,34 @@ def test_a_quarter_of_an_hour_becomes_one_point(tmp_path, monkeypatch):
         pytest.approx(1.1)
     )
     points.close()
+
+
+def test_what_the_detector_kept_without_a_page_is_taken_over_once(tmp_path):
+    """A file of version 0.1, without checksums, and the points of today behind it."""
+    folder = tmp_path / 'signatures' / 'unit__lv101'
+    folder.mkdir(parents=True)
+    began = 1_700_000_000 // 900 * 900
+    old = ['stamp_ns,spring,spring_std,preload,preload_std,friction,friction_std,reference']
+    old += [f'{(began + 900 * k) * 10**9},0.1,0.01,2,1,{0.1 * k:g},0.02,abc' for k in range(3)]
+    old += ['cut', f'{10**9},0.1,0.01,2,1,0.9,0.02,abc']  # the last is of a simulation
+    file = folder / 'LV-101.trend.csv'
+    file.write_text('\n'.join(old) + '\n')
+    valve = Valve('unit/lv101')
+    for turn in range(3):
+        points = TrendPoints(Intervals(tmp_path / 'trends.sqlite'), [folder.parent])
+        points.take(valve)
+        flag = FaultFlag()
+        flag.header.frame_id = 'LV-101'
+        valve.take_flag(flag, 0.0)
+        points.take(valve)
+        points.take(valve)
+        found = points.intervals.series('unit/lv101', 'friction', began, began + 1e6)
+        assert found.mean == pytest.approx([0.0, 0.1, 0.2, 0.7][: 3 + (turn > 0)])
+        assert found.std[0] == pytest.approx(0.02)
+        points.close()
+        TrendFile(folder, 'LV-101', 'abc').add(
+            (began + 3600) * 10**9, (0.1, 2.0, 0.7), (0.01, 1.0, 0.02)
+        )
 
 
 def test_a_signature_that_is_still_learned_is_no_trend(tmp_path, monkeypatch):

@@ -66,6 +66,17 @@ def arguments_of(
     return words + assignments(parameters)
 
 
+def signatures(valves: Sequence[Valve]) -> list[str]:
+    """
+    List the folders of signatures and trends that a fleet file states.
+
+    :param valves: of the fleet.
+    :return: each once; "auto" and none are left out.
+    """
+    stated = (str(valve.settings.get('signature_folder') or 'auto') for valve in valves)
+    return [folder for folder in dict.fromkeys(stated) if folder != 'auto']
+
+
 def tasks_of(valves: list[Valve], options: argparse.Namespace) -> list[Task]:
     """
     List what has to run.
@@ -107,6 +118,7 @@ def tasks_of(valves: list[Valve], options: argparse.Namespace) -> list[Task]:
                 ['--port', str(options.port), '--host', options.host]
                 + (['--show'] if options.show else [])
                 + (['--token-file', str(options.token_file)] if options.token_file else [])
+                + [word for folder in signatures(valves) for word in ('--signatures', folder)]
                 + arguments_of({}, enclave='/dashboard'),
             )
         )

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from damadics_fd.ros.arguments import command_parser, split_ros_args, state_folder
 from damadics_fd.store.access import Access, AccessError, parse_access, read_access
+from damadics_fd.store.alarms import default_folder
 
 from damadics_dashboard.server.access import Guard, check_binding
 
@@ -60,6 +61,15 @@ def parser() -> argparse.ArgumentParser:
         metavar='N',
         help='take all samples of all valves in fleets up to N, otherwise only of '
         'those that are looked at (16)',
+    )
+    p.add_argument(
+        '--signatures',
+        type=Path,
+        action='append',
+        default=[default_folder()],
+        metavar='DIR',
+        help='signature_folder of detectors, beside "auto": the trends that they kept while there '
+        'was no page are taken over; again for more',
     )
     p.add_argument('--show', action='store_true', help='open the page in a browser')
     return p
@@ -134,7 +144,7 @@ def serve(options: argparse.Namespace, access: Access, ros_args: list[str]) -> i
     from damadics_dashboard.store.history import History
 
     history = History(options.state / 'history.sqlite')
-    trends = TrendPoints(Intervals(options.state / 'trends.sqlite'))
+    trends = TrendPoints(Intervals(options.state / 'trends.sqlite'), options.signatures)
     watcher = Watcher(history, trends, options.follow, ros_args)
     app.add_static_files('/assets', str(HERE / 'static'))
     app.add_middleware(SizeLimit)

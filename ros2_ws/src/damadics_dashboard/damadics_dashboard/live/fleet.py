@@ -8,10 +8,38 @@ from collections.abc import Callable
 from damadics_fd.core.stamps import SECOND as NANO
 from damadics_fd.core.text import NAME, plain
 from damadics_msgs.msg import FaultFlag, FleetEvent, FleetLayout, FleetStatus
+from damadics_msgs.srv import (
+    FleetAcknowledge,
+    FleetReference,
+    FleetRelearn,
+    FleetReset,
+    FleetShelve,
+)
 
-from damadics_dashboard.live.valve import Valve
+from damadics_dashboard.live.calls import Field, Service
+from damadics_dashboard.live.valve import Membership, Valve
 
 Meet = Callable[[str], Valve]
+SERVICES: dict[str, tuple[str, Service, dict[str, Field]]] = {  # of one valve: those of a fleet
+    'acknowledge': ('acknowledge', FleetAcknowledge, {}),
+    'reset': ('reset', FleetReset, {}),
+    'shelve': ('shelve', FleetShelve, {}),
+    'relearn': ('relearn', FleetRelearn, {}),
+    'save_reference': ('reference', FleetReference, {'save': True}),
+    'load_reference': ('reference', FleetReference, {'save': False}),
+}
+
+
+def shared(member: Membership, service: str) -> tuple[str, Service, dict[str, Field]]:
+    """
+    Return what a fleet serves instead of a service of one valve.
+
+    :param member: the valve in its fleet.
+    :param service: of one valve.
+    :return: name of the service, its type, the fields that name the valve.
+    """
+    name, kind, fields = SERVICES[service]
+    return f'{member.topic}/{name}', kind, {**fields, 'valves': [member.name]}
 
 
 class FleetReport:
@@ -19,10 +47,12 @@ class FleetReport:
     What one process says of its valves.
 
     :param meet: returns the valve of a name, which is made where it is new.
+    :param topic: of the fleet, such as `/fleet`.
     """
 
-    def __init__(self, meet: Meet) -> None:
+    def __init__(self, meet: Meet, topic: str) -> None:
         self._meet = meet
+        self._topic = topic
         self._version = -1
         self._valves: list[Valve] = []
 
@@ -38,6 +68,7 @@ class FleetReport:
             valve = self._meet(name.strip('/'))
             valve.tag = plain(tag, NAME)
             valve.area = plain(area, NAME)
+            valve.fleet = Membership(self._topic, name)
             self._valves.append(valve)
 
     def take_status(self, message: FleetStatus, now: float) -> None:

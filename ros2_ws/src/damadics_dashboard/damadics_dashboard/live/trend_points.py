@@ -6,17 +6,21 @@ import math
 import sqlite3
 import time
 from collections import defaultdict
+from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 from damadics_fd.core.stamps import SECOND as NANO
+from damadics_fd.store.file_names import file_name
 from damadics_fd.store.intervals import DAY, LEVELS, Intervals, Spread
+from damadics_fd.store.trends import QUANTITIES, read_points, trend_path
 from damadics_msgs.msg import Signature
 
 from damadics_dashboard.live.motion import Motion
 from damadics_dashboard.live.valve import Valve
 
 OLDEST = 10.0  # s; an older signature is not one of now
-CHANGES = ('spring', 'preload', 'friction')
+DATED = 1e8  # s; smaller times count from the start of a simulation
 WATCHING = (Signature.STATE_MONITOR, Signature.STATE_ALARM)
 
 
@@ -29,6 +33,7 @@ class _Valve:
         self.motion = Motion()
         self.seen = -1  # ns, stamp of the last position that was looked at
         self.signature: Signature | None = None
+        self.caught_up = False  # with what the detector has kept
 
 
 class TrendPoints:
@@ -36,10 +41,14 @@ class TrendPoints:
     Gathers values every second and writes a point for every quarter of an hour.
 
     :param intervals: takes the points.
+    :param folders: where detectors keep trends of their own, with or without a page (their
+        `signature_folder`, or one with a folder per valve): what they hold of the time before a
+        valve was first heard is taken over.
     """
 
-    def __init__(self, intervals: Intervals) -> None:
+    def __init__(self, intervals: Intervals, folders: Sequence[Path] = ()) -> None:
         self.intervals = intervals
+        self._folders = tuple(folders)
         self.problem = intervals.problem
         self._valves: dict[str, _Valve] = defaultdict(_Valve)
         self._began = self._interval()
@@ -52,6 +61,9 @@ class TrendPoints:
         :param valve: the valve.
         """
         mine = self._valves[valve.name]
+        if valve.tag and not mine.caught_up:
+            self._catch_up(valve.name, valve.tag)
+            mine.caught_up = True
         signature = valve.signature
         if signature is not None and signature is not mine.signature:
             mine.signature = signature
@@ -84,6 +96,24 @@ class TrendPoints:
         self.problem = ''
         self._began = present
 
+    def _catch_up(self, name: str, tag: str) -> None:
+        """Take over what the detector has kept while no page was there."""
+        try:
+            first, last = self.intervals.span(name) or (math.inf, -math.inf)
+            own = file_name(name.replace('/', '__') or 'root')
+            places = [p for folder in self._folders for p in (folder, folder / own)]
+            for path in (trend_path(place, tag) for place in places):
+                if not path.is_file():
+                    continue
+                for point in read_points(path):
+                    start = point.stamp / NANO // LEVELS[0] * LEVELS[0]
+                    if start >= DATED and not first <= start <= last:
+                        values = dict(zip(QUANTITIES, point.change, strict=True))
+                        std = dict(zip(QUANTITIES, point.std, strict=True))
+                        self.intervals.add(name, start, values, std, point.reference)
+        except (OSError, sqlite3.Error) as problem:
+            self.problem = f'earlier trends of {name} are not taken over: {problem}'
+
     def close(self) -> None:
         """Write what there is and close the file."""
         self.keep(time.monotonic(), force=True)
@@ -97,7 +127,9 @@ class TrendPoints:
     def _take_signature(mine: _Valve, signature: Signature) -> None:
         if signature.state not in WATCHING:
             return
-        for name, value, std in zip(CHANGES, signature.change, signature.change_std, strict=True):
+        for name, value, std in zip(
+            QUANTITIES, signature.change, signature.change_std, strict=True
+        ):
             mine.values[name].append(float(value))
             mine.std[name] = float(std)
         if signature.stick_ratio > 0.0:

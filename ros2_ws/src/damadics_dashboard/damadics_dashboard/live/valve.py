@@ -56,6 +56,13 @@ class Alarm:
     evidence: EventRow = field(default_factory=EventRow)
 
 
+class Membership(NamedTuple):
+    """A valve among those that one process judges."""
+
+    topic: str  # of the process, such as /fleet
+    name: str  # of the valve, as that process lists it
+
+
 class Valve:
     """
     One valve: its latest flag, events, diagnostics and samples.
@@ -75,6 +82,7 @@ class Valve:
         self.signature: Signature | None = None
         self.isolation: Isolation | None = None
         self.area = ''
+        self.fleet: Membership | None = None
         self.learned = math.nan  # share of the learning that a fleet reports
         self.period = 0.0
         self.diagnostics: dict[str, dict[str, str]] = {}

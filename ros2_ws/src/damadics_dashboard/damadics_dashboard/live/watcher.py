@@ -34,7 +34,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.subscription import Subscription
 
 from damadics_dashboard.live.calls import Calls, Field, Service, ServiceError
-from damadics_dashboard.live.fleet import FleetReport
+from damadics_dashboard.live.fleet import FleetReport, shared
 from damadics_dashboard.live.record import action_row, event_row
 from damadics_dashboard.live.trend_points import TrendPoints
 from damadics_dashboard.live.valve import Valve
@@ -177,6 +177,10 @@ class Watcher:
         :raises ServiceError: where nobody answers.
         """
         name = _topic(valve, service)
+        known = self.valves.get(valve)
+        if name not in self.services and known is not None and known.fleet:
+            name, kind, more = shared(known.fleet, service)
+            request = {**request, **more}
         if name not in self.services:
             raise ServiceError(f'nobody serves {name}: is the node running?')
         return await self._calls.call(name, kind, patience, request)
@@ -283,7 +287,7 @@ class Watcher:
 
     def _meet_fleet(self, topic: str, parent: str) -> None:
         """Take what one process says of its many valves."""
-        report = self._fleets[topic] = FleetReport(self._valve)
+        report = self._fleets[topic] = FleetReport(self._valve, parent)
 
         def take_status(message: FleetStatus) -> None:
             report.take_status(message, time.monotonic())

@@ -7,14 +7,18 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+import yaml
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.recording import Recording, find_recordings
 from damadics_fd.causes import load_causes
 from damadics_fd.commands.replay.bags import joined
 from damadics_fd.core.decision.events import Event
+from damadics_fd.core.field import Value
 from damadics_fd.core.monitor import monitor_for
+from damadics_fd.core.record import Plain
 from damadics_fd.core.result import Result
-from damadics_fd.core.settings import Settings
+from damadics_fd.core.settings import Settings, SettingsError
+from damadics_fd.core.settings.document import parameters_in
 from damadics_fd.core.stamps import SECOND as NANO
 from damadics_fd.figures.decimation import Thinner
 
@@ -26,6 +30,8 @@ INTERVALS = 1200  # across the plots of a whole recording
 RAISED, CLEARED = 0, 1
 HEALTHY = 2  # and the states of an alarm; below it nothing was judged
 MOST_POINTS = 4000  # of the signature
+
+Given = dict[str, Value]  # settings by name, as a parameter file has them
 
 
 @dataclass
@@ -82,23 +88,56 @@ class Playback:
         ]
 
 
-def play(path: Path, mode: str, name: str = '') -> list[Playback]:
+def settings_in_file(text: str) -> Given:
+    """
+    Read what describes a valve, as `commission` writes it.
+
+    :param text: of a parameter file (YAML).
+    :return: settings, `mode` among them where it is stated.
+    :raises SettingsError: where it is no such file, or a value is wrong; says what.
+    """
+    try:
+        given = parameters_in(yaml.safe_load(text))
+    except yaml.YAMLError as problem:
+        raise SettingsError([f'this is no parameter file: {problem}']) from problem
+    known = {entry['name'] for entry in Settings.describe()}
+    found = {name: _value(name, value) for name, value in given.items() if name in known}
+    if not found:
+        raise SettingsError(['it sets nothing of a valve: give what commission has written'])
+    Settings.from_mapping(found)
+    return found
+
+
+def _value(name: str, value: Plain) -> Value:
+    """Return a value of a file as settings take it."""
+    if isinstance(value, bool | int | float | str):
+        return value
+    if isinstance(value, list):
+        numbers = [v for v in value if isinstance(v, int | float)]
+        if len(numbers) == len(value):
+            return tuple(map(float, numbers))
+    raise SettingsError([f'{name} is {value}: give a number, a word or a list of numbers'])
+
+
+def play(path: Path, mode: str, name: str = '', settings: Given | None = None) -> list[Playback]:
     """
     Replay every valve in a file.
 
     :param path: an MCAP file, or a table.
     :param mode: `monitor`, `paper` or `scada`.
     :param name: that the file had where it came from.
+    :param settings: that differ from the defaults of the mode.
     :return: one result per valve.
     :raises BagError: where there is nothing to replay; says why.
+    :raises SettingsError: where the settings are none of this mode.
     """
-    return [_play(recording, mode, name) for recording in find_recordings([path])]
+    chosen = Settings.from_mapping({**(settings or {}), 'mode': mode})
+    return [_play(recording, chosen, name) for recording in find_recordings([path])]
 
 
-def _play(recording: Recording, mode: str, name: str) -> Playback:
+def _play(recording: Recording, settings: Settings, name: str) -> Playback:
     topic = recording.topic if recording.topic != '/measurement' else ''
     done = Playback(' '.join(filter(None, (name or recording.path.name, topic))))
-    settings = Settings.for_mode(mode)
     monitor, thinner = monitor_for(settings, load_causes().classes), Thinner()
     first = last = None
     for columns in joined(recording.chunks(done.problems.append)):

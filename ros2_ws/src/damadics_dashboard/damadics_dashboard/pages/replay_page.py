@@ -7,6 +7,7 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from damadics_fd.core.settings import SettingsError
 from damadics_fd.core.text import COMMENT, NAME, plain
 from nicegui import events, run, ui
 
@@ -20,11 +21,12 @@ from damadics_dashboard.server.limits import LARGEST_UPLOAD
 from damadics_dashboard.words.texts import Texts
 
 if TYPE_CHECKING:
-    from damadics_dashboard.pages.playback import Playback
+    from damadics_dashboard.pages.playback import Given, Playback
 
 MODES = ('monitor', 'paper', 'scada')
 MOST_SHOWN = 20  # recordings of one file
 MOST_ROWS = 500
+LARGEST_SETTINGS = 100_000  # bytes
 KINDS = '.mcap,.csv,.txt,.parquet'
 
 
@@ -43,6 +45,7 @@ def replay_page(watcher: Watcher) -> None:
             with_values(mode, role='group', aria_label=t('mode'))
         explained = ui.label(t(f'mode_{MODES[0]}')).classes('sub')
         mode.on_value_change(lambda: explained.set_text(t(f'mode_{mode.value}')))
+        chosen = _SettingsOfValve(mode, t)
         drop = box('div', 'drop w-full')
         results = box('div', 'stack w-full')
 
@@ -53,7 +56,7 @@ def replay_page(watcher: Watcher) -> None:
             with results:
                 markup('message.html', role='status', title=t('replaying', name=name))
             try:
-                shown = await _replayed(event, str(mode.value), t)
+                shown = await _replayed(event, str(mode.value), chosen.given, t)
             finally:
                 upload.reset()
                 upload.enable()
@@ -79,8 +82,49 @@ def replay_page(watcher: Watcher) -> None:
             with_values(upload, accept=KINDS, aria_label=t('recording_to_replay'))
 
 
+class _SettingsOfValve:
+    """
+    A field for the file that `commission` wrote: recordings are replayed with what it says.
+
+    :param mode: the choice of the mode; the file's is taken.
+    :param t: the words.
+    """
+
+    def __init__(self, mode: ui.toggle, t: Texts) -> None:
+        self.given: Given = {}
+        self._mode = mode
+        self._t = t
+        with box('div', 'row w-full settings-file'):
+            upload = ui.upload(
+                on_upload=self._take,
+                auto_upload=True,
+                max_file_size=LARGEST_SETTINGS,
+                label=t('settings_hint'),
+                on_rejected=lambda: ui.notify(t('too_large'), type='negative'),
+            ).props('flat')
+            with_values(upload, accept='.yaml,.yml', aria_label=t('settings_file'))
+            self._upload = upload
+            self._said = ui.label(t('settings_none')).classes('sub')
+            with_values(self._said, role='status')
+
+    async def _take(self, event: events.UploadEventArguments) -> None:
+        from damadics_dashboard.pages.playback import settings_in_file  # slow to load
+
+        t, name = self._t, plain(event.file.name, NAME)
+        try:
+            self.given = settings_in_file((await event.file.read()).decode('utf-8'))
+            said = t('settings_taken', name=name, number=len(self.given))
+        except (SettingsError, UnicodeDecodeError) as problem:
+            self.given = {}
+            said = t('settings_refused', name=name, why=plain(str(problem), COMMENT))
+        if self.given.get('mode') in MODES:
+            self._mode.set_value(self.given['mode'])
+        self._said.set_text(said)
+        self._upload.reset()
+
+
 async def _replayed(
-    event: events.UploadEventArguments, mode: str, t: Texts
+    event: events.UploadEventArguments, mode: str, settings: 'Given', t: Texts
 ) -> 'list[Playback] | str':
     """Replay what was dropped; return why not as a sentence."""
     # what judges recordings takes seconds to load, which the page does not wait for
@@ -91,7 +135,7 @@ async def _replayed(
         path = Path(folder, f'recording{suffix or ".mcap"}')
         try:
             await event.file.save(path)
-            done = await run.io_bound(play, path, mode, plain(event.file.name, NAME))
+            done = await run.io_bound(play, path, mode, plain(event.file.name, NAME), settings)
             return done or []  # none where the page is closing
         except Exception as problem:  # a recording of somebody else must not hold up the page
             logging.getLogger(__name__).warning('replay failed: %r', problem)

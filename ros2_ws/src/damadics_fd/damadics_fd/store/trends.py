@@ -64,6 +64,17 @@ def _span(seconds: float) -> str:
     return f'{seconds:.0f} s'
 
 
+def trend_path(folder: Path, actuator: str) -> Path:
+    """
+    Name the file of the trends of an actuator.
+
+    :param folder: where the references are.
+    :param actuator: tag.
+    :return: path of the file, whether it is there or not.
+    """
+    return Path(folder) / f'{file_name(actuator)}.trend.csv'
+
+
 def series_name(signature: Saved) -> str:
     """
     Name the series of the points that are measured against a reference.
@@ -95,7 +106,7 @@ class TrendFile:
     ) -> None:
         if set(reference) & set(',\n\r'):
             raise ValueError(f'reference {reference!r} must not contain a comma or a line break')
-        self.path = Path(folder) / f'{file_name(actuator)}.trend.csv'
+        self.path = trend_path(folder, actuator)
         self.reference = reference
         self.interval = interval
         self.unreadable = 0
@@ -191,6 +202,34 @@ class TrendFile:
         self._rows = self._rows[:half:2] + self._rows[half:]
         lines = [_line(round(t * 1e9), values, self.reference) for t, *values in self._rows]
         replace_file(self.path, HEADER + ''.join(lines))
+
+
+@dataclass(frozen=True)
+class Point:
+    """One line of a file of trends: change and standard deviation by QUANTITIES."""
+
+    stamp: int  # ns
+    change: tuple[float, ...]
+    std: tuple[float, ...]
+    reference: str
+
+
+def read_points(path: Path) -> list[Point]:
+    """
+    Read all points of a file of trends, whatever they were measured against.
+
+    :param path: of the file; it is not changed.
+    :return: in the order of the file; lines that cannot be read are left out.
+    :raises OSError: where the file cannot be read, or is too large.
+    """
+    points = []
+    for line in read_bounded(path).decode('utf-8', 'replace').splitlines()[1:]:
+        try:
+            stamp, values, reference = _read(line)
+        except ValueError:
+            continue
+        points.append(Point(stamp, tuple(values[::2]), tuple(values[1::2]), reference))
+    return points
 
 
 def _line(stamp: int, values: Sequence[float], reference: str) -> str:
