@@ -33,5 +33,5 @@ if ! (cd ros2_ws && "$python" -m colcon --log-base log build --event-handlers co
 fi
 echo 'Compiling the hot loops ...'
 set +u; source ./env.sh; set -u
-python tools/compile_kernels.py
+python tools/compile_kernels.py demo
 touch ros2_ws/install/.built

@@ -7,6 +7,8 @@ import json
 import math
 import shutil
 import sys
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import ExitStack, closing
 from pathlib import Path
 
 from damadics_fd.core.settings import Settings
@@ -16,7 +18,6 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from damadics_bringup import live_run
 from damadics_bringup.experiments import (
     EXPERIMENTS,
     NOMINAL,
@@ -28,7 +29,10 @@ from damadics_bringup.experiments import (
     Outcome,
     judge,
 )
+from damadics_bringup.live_run import LiveRun
 from damadics_bringup.processes import ProcessError
+
+AS_FAST_AS_IT_GOES = 0.0  # for what is learned, which waits in no queue of another process
 
 
 def main(args: list[str] | None = None) -> int:
@@ -40,12 +44,11 @@ def main(args: list[str] | None = None) -> int:
     """
     options = parser().parse_args(args)
     console = Console()
-    outcomes = []
+    chosen = [e for e in EXPERIMENTS if options.only in (None, e.name)]
     try:
-        learned = _learn(options, console)
-        for experiment in EXPERIMENTS:
-            if options.only in (None, experiment.name):
-                outcomes.append(_perform(experiment, learned, options, console))
+        with _progress(console) as progress:
+            learned = _learn(options, progress)
+            outcomes = _perform(chosen, learned, options, progress)
     except (ProcessError, ReferenceFileError) as problem:
         print(f'demo: {problem}', file=sys.stderr)
         return 1
@@ -101,51 +104,82 @@ def _positive(text: str) -> float:
     return value
 
 
-def _learn(options: argparse.Namespace, console: Console) -> Learned:
+def _learn(options: argparse.Namespace, progress: Progress) -> Learned:
     """Learn the fault-free experiment live, pass after pass, each from what the last one knew."""
     folder = options.out / 'learned'
     shutil.rmtree(folder, ignore_errors=True)
     reference = folder / 'reference'
     for number in range(1, PASSES + 1):
-        title = f'Learning the fault-free valve ({number} of {PASSES})'
-        with _progress(title, console) as progress:
-            task = progress.add_task('', total=SECONDS, note='starting the nodes')
-            live_run.learn(
-                NOMINAL.scenario,
-                folder / f'pass_{number}',
-                factor=options.factor,
-                on_time=lambda t: progress.update(task, completed=t, note=f't = {t:5.1f} s'),  # noqa: B023
-                reference=reference,
-                until=SECONDS,
-            )
-            progress.update(task, completed=SECONDS, note='')
+        line = _Line(progress, f'Learning the fault-free valve ({number} of {PASSES})')
+        lesson = LiveRun(
+            NOMINAL.scenario, folder / f'pass_{number}', reference, line.on_time, recorded=False
+        )
+        with closing(lesson):
+            lesson.play(AS_FAST_AS_IT_GOES)
+            lesson.keep_learned(SECONDS)
+        line.done()
     return load_reference(reference, None, Settings.for_mode('paper')).learned
 
 
 def _perform(
-    experiment: Experiment, learned: Learned, options: argparse.Namespace, console: Console
-) -> Outcome:
-    folder = options.out / experiment.name
-    with _progress(experiment.title, console) as progress:
-        task = progress.add_task('', total=SECONDS, note='starting the nodes')
-        bag = live_run.run(
-            experiment.scenario,
-            folder,
-            factor=options.factor,
-            on_time=lambda t: progress.update(task, completed=t, note=f't = {t:5.1f} s'),
-            reference=options.out / 'learned' / 'reference',
-        )
-        progress.update(task, completed=SECONDS, note='replaying the bag')
-        outcome, columns_read, result = judge(experiment, bag, learned)
-        progress.update(task, note='drawing')
-        six_panels(result, columns_read, outcome.figure, experiment.title)
-        progress.update(task, note='')
+    experiments: list[Experiment],
+    learned: Learned,
+    options: argparse.Namespace,
+    progress: Progress,
+) -> list[Outcome]:
+    """Run experiments; the processes of the next start while those of the last one end."""
+    reference = options.out / 'learned' / 'reference'
+    outcomes: list[Future[Outcome]] = []
+    with ThreadPoolExecutor(1) as judging, ExitStack() as left:
+
+        def begin(experiment: Experiment) -> tuple[Experiment, _Line, LiveRun]:
+            line = _Line(progress, experiment.title)
+            folder = options.out / experiment.name
+            run = LiveRun(experiment.scenario, folder, reference, line.on_time, recorded=True)
+            return experiment, line, left.enter_context(closing(run))
+
+        following = begin(experiments[0])
+        for number in range(len(experiments)):
+            experiment, line, run = following
+            run.play(options.factor)
+            if number + 1 < len(experiments):
+                following = begin(experiments[number + 1])
+            run.finish()
+            run.close()
+            outcomes.append(judging.submit(_judge, experiment, run.bag, learned, line))
+    return [outcome.result() for outcome in outcomes]
+
+
+def _judge(experiment: Experiment, bag: Path, learned: Learned, line: '_Line') -> Outcome:
+    line.note('replaying the bag')
+    outcome, columns_read, result = judge(experiment, bag, learned)
+    line.note('drawing')
+    six_panels(result, columns_read, outcome.figure, experiment.title)
+    line.done()
     return outcome
 
 
-def _progress(title: str, console: Console) -> Progress:
+class _Line:
+    """What is told of one run while it goes on."""
+
+    def __init__(self, progress: Progress, title: str) -> None:
+        self._progress = progress
+        self._task = progress.add_task(title, total=SECONDS, note='starting the nodes')
+
+    def on_time(self, t: float) -> None:
+        self._progress.update(self._task, completed=t, note=f't = {t:5.1f} s')
+
+    def note(self, text: str) -> None:
+        self._progress.update(self._task, completed=SECONDS, note=text)
+
+    def done(self) -> None:
+        self.note('')
+        self._progress.stop_task(self._task)
+
+
+def _progress(console: Console) -> Progress:
     columns = (
-        TextColumn(f'{title:<42}'),
+        TextColumn('{task.description:<42}'),
         BarColumn(),
         TextColumn('{task.percentage:3.0f} %'),
         TextColumn('{task.fields[note]}'),

@@ -38,6 +38,9 @@ CHAIN = {  # the number of subscribers of each topic before the plant starts
 PATIENCE = 30.0  # s for the processes to discover each other
 WRITING = 120.0  # s for the queues to empty, and for the recorder to write what it has
 QUIET = 1.0  # s from the detector's last word to the end of the processes
+AGAIN = 0.3  # s between two looks at how far the estimator has learned
+# Faster than real time, samples wait for their senders to be free: many then go in one packet.
+BUNDLED = {'RMW_FASTRTPS_PUBLICATION_MODE': 'ASYNCHRONOUS'}
 
 
 class Watcher:
@@ -51,7 +54,7 @@ class Watcher:
     def __init__(self, domain: int, on_time: Callable[[float], None]) -> None:
         self._context = Context()
         rclpy.init(context=self._context, domain_id=domain)
-        self._node = rclpy.create_node('demo', context=self._context)
+        self._node = rclpy.create_node('demo', context=self._context, enable_rosout=False)
         self._executor = EventsExecutor(context=self._context)
         self._executor.add_node(self._node)
         self.time = 0.0
@@ -117,109 +120,102 @@ class Watcher:
         self._context.try_shutdown()
 
 
-def run(
-    scenario: str,
-    folder: Path,
-    *,
-    factor: float,
-    on_time: Callable[[float], None],
-    reference: Path,
-) -> Path:
+class LiveRun:
     """
-    Run a scenario live in paper mode, from what was learned before, and record it.
+    The processes of one scenario in paper mode, in steps: the next may start while this one ends.
+
+    Close it whatever happens; that ends what still runs.
 
     :param scenario: name of the scenario.
     :param folder: for the bag and the logs; what is there is replaced.
-    :param factor: seconds of scenario per second of wall time.
-    :param on_time: called with the scenario time [s] while it runs.
     :param reference: what the estimator begins with; where it does not exist, zero weights.
-    :return: the bag.
-    :raises ProcessError: where a process fails, or the chain does not come about.
-    """
-    shutil.rmtree(folder, ignore_errors=True)
-    bag = folder / 'bag'
-    domain = free_domain()
-    os.environ.update(surroundings(domain))  # the watcher lives in this process
-    with Processes(folder / 'logs', surroundings(domain)) as processes:
-        watcher = Watcher(domain, on_time)
-        try:
-            processes.start('damadics_fd', 'recorder', ['--all', '--out', str(bag)])
-            _start_estimator(processes, reference)
-            processes.start('damadics_fd', 'detector', parameters(mode='paper'))
-            _await_chain(watcher, processes)
-            _play(scenario, factor, 2, watcher, processes)
-            processes.check()
-            watcher.spin_until(lambda: watcher.judged >= watcher.time, WRITING)
-            watcher.spin_until(lambda: False, QUIET)
-            for name in ('estimator', 'detector', 'recorder'):
-                processes.end(name, WRITING)
-        finally:
-            watcher.close()
-    return bag
-
-
-def learn(
-    scenario: str,
-    folder: Path,
-    *,
-    factor: float,
-    on_time: Callable[[float], None],
-    reference: Path,
-    until: float,
-) -> None:
-    """
-    Let the estimator learn a scenario live in paper mode, and save what it knows at its end.
-
-    :param scenario: name of the scenario.
-    :param folder: for the logs; what is there is replaced.
-    :param factor: seconds of scenario per second of wall time.
     :param on_time: called with the scenario time [s] while it runs.
-    :param reference: what the estimator begins with, zero weights where it does not exist; what
-        it has learned is saved there.
-    :param until: end of the scenario [s].
-    :raises ProcessError: where a process fails, or not all of the scenario is learned.
+    :param recorded: judge and record, not only estimate.
     """
-    shutil.rmtree(folder, ignore_errors=True)
-    domain = free_domain()
-    os.environ.update(surroundings(domain))
-    with Processes(folder / 'logs', surroundings(domain)) as processes:
-        watcher = Watcher(domain, on_time)
-        try:
-            _start_estimator(processes, reference)
-            _play(scenario, factor, 1, watcher, processes)
-            deadline = time.monotonic() + WRITING
-            while watcher.save_reference(reference) < until:
-                processes.check()
-                if time.monotonic() > deadline:
-                    raise ProcessError(f'the estimator has not taken all {until:g} s: see its log')
-                watcher.spin_until(lambda: False, QUIET)
-            processes.end('estimator', WRITING)
-        finally:
-            watcher.close()
 
+    def __init__(
+        self,
+        scenario: str,
+        folder: Path,
+        reference: Path,
+        on_time: Callable[[float], None],
+        *,
+        recorded: bool,
+    ) -> None:
+        shutil.rmtree(folder, ignore_errors=True)
+        self.bag = folder / 'bag'
+        self._scenario = scenario
+        self._reference = reference
+        self._recorded = recorded
+        domain = free_domain()
+        os.environ.update(surroundings(domain))  # the watcher lives in this process
+        self._watcher = Watcher(domain, on_time)
+        self._processes = Processes(folder / 'logs', surroundings(domain))
+        kept = {'reference': str(reference.resolve())}
+        if recorded:
+            self._processes.start('damadics_fd', 'recorder', ['--all', '--out', str(self.bag)])
+        self._processes.start(
+            'damadics_fd', 'estimator', parameters(mode='paper', **kept), more=BUNDLED
+        )
+        if recorded:
+            self._processes.start(
+                'damadics_fd', 'detector', parameters(mode='paper'), more=BUNDLED
+            )
 
-def _start_estimator(processes: Processes, reference: Path) -> None:
-    kept = {'reference': str(reference.resolve())}
-    processes.start('damadics_fd', 'estimator', parameters(mode='paper', **kept))
+    def close(self) -> None:
+        """End what still runs."""
+        self._processes.end_all()
+        self._watcher.close()
 
+    def play(self, factor: float) -> None:
+        """
+        Simulate the scenario to its end, once everybody listens.
 
-def _play(
-    scenario: str, factor: float, takers: int, watcher: Watcher, processes: Processes
-) -> None:
-    """Simulate the scenario to its end, once so many take it."""
-    processes.start(
-        'damadics_plant',
-        'plant',
-        parameters(
-            scenario=scenario,
-            rate=400.0,
-            real_time_factor=factor,
-            publish_clock=True,
-            wait_for_subscribers=takers,
-        ),
-    )
-    watcher.spin_until(lambda: processes.ended('plant'), PATIENCE + 3600.0)
-    processes.check()
+        :param factor: seconds of scenario per second of wall time; 0: as fast as it goes.
+        :raises ProcessError: where a process fails, or the chain does not come about.
+        """
+        if self._recorded:
+            _await_chain(self._watcher, self._processes)
+        self._processes.start(
+            'damadics_plant',
+            'plant',
+            parameters(
+                scenario=self._scenario,
+                rate=400.0,
+                real_time_factor=factor,
+                publish_clock=True,
+                wait_for_subscribers=2 if self._recorded else 1,
+            ),
+        )
+        self._watcher.spin_until(lambda: self._processes.ended('plant'), PATIENCE + 3600.0)
+        self._processes.check()
+
+    def finish(self) -> None:
+        """
+        Let the detector judge and the recorder write what the plant has sent.
+
+        :raises ProcessError: where a process fails.
+        """
+        watcher = self._watcher
+        watcher.spin_until(lambda: watcher.judged >= watcher.time, WRITING)
+        watcher.spin_until(lambda: False, QUIET)
+        for name in ('estimator', 'detector', 'recorder'):
+            self._processes.end(name, WRITING)
+
+    def keep_learned(self, until: float) -> None:
+        """
+        Have the estimator save what it has learned.
+
+        :param until: end of the scenario [s].
+        :raises ProcessError: where a process fails, or not all of the scenario is learned.
+        """
+        deadline = time.monotonic() + WRITING
+        while self._watcher.save_reference(self._reference) < until:
+            self._processes.check()
+            if time.monotonic() > deadline:
+                raise ProcessError(f'the estimator has not taken all {until:g} s: see its log')
+            self._watcher.spin_until(lambda: False, AGAIN)
+        self._processes.end('estimator', WRITING)
 
 
 def _await_chain(watcher: Watcher, processes: Processes) -> None:

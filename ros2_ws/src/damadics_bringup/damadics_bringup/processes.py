@@ -145,8 +145,7 @@ class Processes:
         self._running: dict[str, subprocess.Popen[bytes]] = {}
 
     def __enter__(self) -> 'Processes':
-        """Make the folder for the logs."""
-        self._logs.mkdir(parents=True, exist_ok=True)
+        """Begin with none."""
         return self
 
     def __exit__(
@@ -192,7 +191,12 @@ class Processes:
         self._environment.pop(variable, None)
 
     def start(
-        self, package: str, name: str, arguments: Sequence[str] = (), label: str = ''
+        self,
+        package: str,
+        name: str,
+        arguments: Sequence[str] = (),
+        label: str = '',
+        more: Mapping[str, str] | None = None,
     ) -> None:
         """
         Start an executable.
@@ -201,6 +205,7 @@ class Processes:
         :param name: its name.
         :param arguments: its command line.
         :param label: what it is known by here, where one executable runs more than once.
+        :param more: variables added to its environment alone.
         """
         label = label or name
         self.log(label).parent.mkdir(parents=True, exist_ok=True)
@@ -209,7 +214,7 @@ class Processes:
                 [executable(package, name), *arguments],
                 stdout=log,
                 stderr=subprocess.STDOUT,
-                env=self._environment,
+                env=self._environment | dict(more or {}),
                 start_new_session=True,  # Ctrl-C reaches it through this process, and once only
                 preexec_fn=partial(end_with, os.getpid()),
             )

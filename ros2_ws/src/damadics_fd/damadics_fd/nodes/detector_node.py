@@ -8,7 +8,6 @@ from pathlib import Path
 
 from damadics_msgs.msg import Estimate as EstimateMessage
 from damadics_msgs.msg import FaultEvent, FaultFlag, Float64Stamped
-from rclpy.serialization import deserialize_message
 
 from damadics_fd.causes import explain
 from damadics_fd.core.approximator.state import Estimate
@@ -25,9 +24,9 @@ from damadics_fd.nodes.second_publisher import RivalWatch
 from damadics_fd.nodes.signature_publisher import SignaturePublisher, read_causes
 from damadics_fd.ros import qos
 from damadics_fd.ros.arguments import check_node_arguments
-from damadics_fd.ros.conversions import event_message, read_estimate, set_stamp, write_flag
+from damadics_fd.ros.conversions import event_message, write_flag
 from damadics_fd.ros.diagnostics import Level, Report
-from damadics_fd.ros.raw import stamp_of
+from damadics_fd.ros.raw import Encoder, any_estimate, stamp_of
 from damadics_fd.ros.spin import spin
 from damadics_fd.store.alarms import default_folder
 
@@ -88,7 +87,8 @@ class DetectorNode(MonitoringNode):
         self._judged = self._twice = 0
         self._phase = PHASE_INIT
         self._was_silent = True
-        self._number = Float64Stamped()
+        self._tag = ''
+        self._encode = Encoder()
         self._flag = FaultFlag()
         self._flag.header.frame_id = self.actuator
         self._residual = made.publisher(Float64Stamped, 'residual', qos.SAMPLES)
@@ -132,8 +132,7 @@ class DetectorNode(MonitoringNode):
     def _read(self, data: bytes) -> tuple[Estimate, str] | None:
         if self._taker.is_echo(stamp_of(data)):
             return None
-        message = deserialize_message(data, EstimateMessage)
-        return read_estimate(message), message.header.frame_id
+        return any_estimate(data)
 
     def _folder_of(self, given: str, own: str = '') -> Path | None:
         """Return the folder that a parameter means; `own` is the part of this valve in `auto`."""
@@ -170,16 +169,12 @@ class DetectorNode(MonitoringNode):
     def _publish(self, decision: Decision, tag: str) -> None:
         """Publish residual and threshold to who listens, and the flag where it has changed."""
         before, self._decision = self._decision, decision
-        number, header = self._number, self._number.header
-        set_stamp(header.stamp, decision.stamp)
-        if header.frame_id != tag:
-            header.frame_id = self._flag.header.frame_id = tag
+        if self._tag != tag:
+            self._tag = self._flag.header.frame_id = tag
         if self._residual.get_subscription_count():
-            number.data = decision.residual
-            self._residual.publish(number)
+            self._residual.publish(self._encode(decision.stamp, tag, decision.residual))
         if self._threshold.get_subscription_count():
-            number.data = decision.threshold
-            self._threshold.publish(number)
+            self._threshold.publish(self._encode(decision.stamp, tag, decision.threshold))
         turned = self._was_silent and self._look()
         if not turned and (before is None or decision.shown != before.shown):
             self._publish_flag()
@@ -189,7 +184,7 @@ class DetectorNode(MonitoringNode):
         """Tell transitions, and keep alarm and signature for a restart."""
         if decision.events:
             self._tell(decision.events, tag)
-        self._signature.update(self._number.header, decision.stamp)
+        self._signature.update(decision.stamp, tag)
 
     def _tell(self, events: Iterable[Event], frame_id: str, more: str = '') -> None:
         for event in events:

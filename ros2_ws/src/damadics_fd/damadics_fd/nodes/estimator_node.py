@@ -29,9 +29,8 @@ from damadics_fd.nodes.operator import OperatorActions
 from damadics_fd.nodes.reference_keeper import ReferenceKeeper
 from damadics_fd.ros import qos
 from damadics_fd.ros.arguments import check_node_arguments
-from damadics_fd.ros.conversions import write_estimate
 from damadics_fd.ros.diagnostics import Level, Report
-from damadics_fd.ros.raw import any_sample
+from damadics_fd.ros.raw import EstimateEncoder, any_sample
 from damadics_fd.ros.spin import spin
 
 DESCRIPTION = 'Estimate velocity and residual of one valve with the on-line approximator.'
@@ -75,7 +74,7 @@ class EstimatorNode(MonitoringNode):
         """Begin afresh, with the reference where there is one."""
         made = self.entities
         self._core.reset()
-        self._message = EstimateMessage()
+        self._encoder = EstimateEncoder()
         self._joint = self._joints.at(self.resolve_topic_name('estimate'))
         self._progress = 0.0
         self._last = self._core.phase
@@ -113,11 +112,9 @@ class EstimatorNode(MonitoringNode):
         """Hand an estimate to the detector beside, and publish it for whoever else listens."""
         takers = self._joint.takers
         if not takers or self._publisher.get_subscription_count() > len(takers):
-            write_estimate(estimate, self._message)
-            self._message.header.frame_id = tag
             for taker in takers:
                 taker.sent(estimate.stamp)
-            self._publisher.publish(self._message)
+            self._publisher.publish(self._encoder.encode(estimate, tag))
         self._joint.hand(estimate, tag)
 
     def _relearn(self, request: Relearn.Request, response: Relearn.Response) -> Relearn.Response:

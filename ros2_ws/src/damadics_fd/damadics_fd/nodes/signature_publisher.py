@@ -17,6 +17,7 @@ from damadics_fd.core.signature.cause import own_alarm_ready
 from damadics_fd.core.signature.signature import Signature
 from damadics_fd.core.stamps import another_run
 from damadics_fd.ros import qos
+from damadics_fd.ros.conversions import header_of
 from damadics_fd.ros.entities import Entities
 from damadics_fd.ros.spin import UsageError
 from damadics_fd.store.file_names import file_name
@@ -129,12 +130,12 @@ class SignaturePublisher:
             **{f'Trend of {o.quantity}': o.sentence() for o in self._outlook},
         }
 
-    def update(self, header: Header, stamp: int) -> None:
+    def update(self, stamp: int, tag: str) -> None:
         """
         Publish where there is news or a second is over.
 
-        :param header: of the measurement.
-        :param stamp: the same stamp [ns].
+        :param stamp: of the measurement [ns].
+        :param tag: of the actuator, as the measurement says.
         """
         state = self._signature.state
         if state is not self._state:  # views of its fields: a record is slow to ask
@@ -146,7 +147,7 @@ class SignaturePublisher:
         self._last, self._next = present, stamp + PERIOD
         if self._folder and s.verified:
             self._contained(self._folder, stamp)
-        message = signature_message(self._signature, header)
+        message = signature_message(self._signature, header_of(stamp, tag))
         write_outlook(self._outlook, message)
         self._publisher.publish(message)
 

@@ -5,6 +5,7 @@
 from builtin_interfaces.msg import Time
 from damadics_msgs.msg import Estimate as EstimateMessage
 from damadics_msgs.msg import FaultEvent, FaultFlag, Measurement
+from std_msgs.msg import Header
 
 from damadics_fd.core.approximator.state import Estimate
 from damadics_fd.core.decision.events import Decision, Event
@@ -42,6 +43,19 @@ def set_stamp(time: Time, stamp: int) -> None:
     time.sec, time.nanosec = divmod(stamp, SECOND)
 
 
+def header_of(stamp: int, tag: str) -> Header:
+    """
+    Make a header.
+
+    :param stamp: of the core [ns].
+    :param tag: of the actuator.
+    :return: the header.
+    """
+    header = Header(frame_id=tag)
+    set_stamp(header.stamp, stamp)
+    return header
+
+
 def sample(message: Measurement) -> Sample:
     """
     Return a measurement as a monitor takes it.
@@ -51,19 +65,6 @@ def sample(message: Measurement) -> Sample:
     """
     m = message
     return Sample(nanoseconds(m.header.stamp), m.cv, m.x1, m.p1, m.p2, m.t1, m.flow, m.ps)
-
-
-def write_estimate(estimate: Estimate, message: EstimateMessage) -> None:
-    """
-    Write an estimate into its message.
-
-    :param estimate: the estimate.
-    :param message: written, but for `frame_id`.
-    """
-    set_stamp(message.header.stamp, estimate.stamp)
-    message.alpha_hat = estimate.alpha_hat
-    for name in SCALARS:
-        setattr(message, name, getattr(estimate, name))
 
 
 def read_estimate(message: EstimateMessage) -> Estimate:

@@ -1,19 +1,24 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Read serialised messages without making messages of them: most of what a sample costs."""
+"""Read and write serialised messages without objects in between: most of a sample's cost."""
 
 import struct
+from operator import attrgetter
 
+from damadics_msgs.msg import Estimate as EstimateMessage
 from damadics_msgs.msg import Measurement
 from rclpy.serialization import deserialize_message
 
+from damadics_fd.core.approximator.state import Estimate
 from damadics_fd.core.sample import SIGNALS, Sample
 from damadics_fd.core.stamps import SECOND
-from damadics_fd.ros.conversions import sample
+from damadics_fd.ros.conversions import read_estimate, sample
 
 HEADER = struct.Struct('<iII')  # sec, nanosec, length of frame_id, behind the encapsulation
 STAMP = struct.Struct('<iI')
 VALUES = struct.Struct(f'<{len(SIGNALS)}d')
+ESTIMATE = struct.Struct(f'<{len(Estimate.names()) - 2}dB')  # all but stamp and phase, the phase
+ESTIMATE_VALUES = attrgetter(*Estimate.names())
 LITTLE_ENDIAN = b'\x00\x01'  # the encapsulation of nearly every machine
 START = 4  # behind the encapsulation
 
@@ -37,16 +42,8 @@ def tagged_sample(data: bytes) -> tuple[Sample, str]:
     :return: the sample, and its frame_id.
     :raises ValueError: where it is not that.
     """
-    if data[:2] != LITTLE_ENDIAN:
-        raise ValueError('the measurement is not in little-endian CDR')
-    try:
-        sec, nanosec, length = HEADER.unpack_from(data, START)
-        at = HEADER.size + length
-        values = VALUES.unpack_from(data, START + at + -at % 8)
-    except struct.error as problem:
-        raise ValueError(f'the measurement is cut off: {problem}') from problem
-    tag = data[START + HEADER.size : START + at - 1].decode(errors='replace')
-    return Sample(sec * SECOND + nanosec, *values), tag
+    stamp, values, tag = _fields(data, VALUES, 'measurement')
+    return Sample(stamp, *values), tag
 
 
 def any_sample(data: bytes) -> tuple[Sample, str]:
@@ -63,6 +60,21 @@ def any_sample(data: bytes) -> tuple[Sample, str]:
     return sample(message), message.header.frame_id
 
 
+def any_estimate(data: bytes) -> tuple[Estimate, str]:
+    """
+    Read a serialised Estimate of any encapsulation.
+
+    :param data: as DDS brings it.
+    :return: the estimate, and its frame_id.
+    :raises ValueError: where it is not that.
+    """
+    if data[:2] == LITTLE_ENDIAN:
+        stamp, values, tag = _fields(data, ESTIMATE, 'estimate')
+        return Estimate(stamp, *values), tag
+    message = deserialize_message(data, EstimateMessage)
+    return read_estimate(message), message.header.frame_id
+
+
 def stamp_of(data: bytes) -> int | None:
     """
     Read the stamp of a serialised message that begins with a header.
@@ -74,3 +86,70 @@ def stamp_of(data: bytes) -> int | None:
         return None
     sec, nanosec = STAMP.unpack_from(data, START)
     return int(sec) * SECOND + int(nanosec)
+
+
+class Encoder:
+    """
+    Serialise messages of a header and some numbers.
+
+    :param numbers: format of what follows the header, as of `struct`, the widest first; by
+        default the number of a Float64Stamped.
+    """
+
+    def __init__(self, numbers: str = 'd') -> None:
+        self._numbers = numbers
+        self._tag = ''
+        self._set('')
+
+    def __call__(self, stamp: int, tag: str, *values: float) -> bytes:
+        """
+        Serialise a message.
+
+        :param stamp: of its header [ns].
+        :param tag: frame_id of its header.
+        :param values: the numbers.
+        :return: its bytes, in little-endian CDR.
+        """
+        if tag != self._tag:
+            self._set(tag)
+        sec, nanosec = divmod(stamp, SECOND)
+        return self._pack(LITTLE_ENDIAN, sec, nanosec, self._length, self._text, *values)
+
+    def _set(self, tag: str) -> None:
+        """Prepare for the messages of an actuator."""
+        self._tag, self._text = tag, tag.encode()
+        self._length = len(self._text) + 1
+        filled = -(HEADER.size + self._length) % 8
+        self._pack = struct.Struct(f'<2s2xiII{self._length}s{filled}x{self._numbers}').pack
+
+
+class EstimateEncoder(Encoder):
+    """Serialise estimates."""
+
+    def __init__(self) -> None:
+        super().__init__(ESTIMATE.format[1:])
+
+    def encode(self, estimate: Estimate, tag: str) -> bytes:
+        """
+        Serialise an estimate.
+
+        :param estimate: of a sample.
+        :param tag: of the actuator.
+        :return: its message.
+        """
+        stamp, *values = ESTIMATE_VALUES(estimate)
+        return self(stamp, tag, *values)
+
+
+def _fields(data: bytes, numbers: struct.Struct, what: str) -> tuple[int, tuple[float, ...], str]:
+    """Read stamp, numbers and tag of a message in little-endian CDR."""
+    if data[:2] != LITTLE_ENDIAN:
+        raise ValueError(f'the {what} is not in little-endian CDR')
+    try:
+        sec, nanosec, length = HEADER.unpack_from(data, START)
+        at = HEADER.size + length
+        values = numbers.unpack_from(data, START + at + -at % 8)
+    except struct.error as problem:
+        raise ValueError(f'the {what} is cut off: {problem}') from problem
+    tag = data[START + HEADER.size : START + at - 1].decode(errors='replace')
+    return sec * SECOND + nanosec, values, tag

@@ -5,10 +5,18 @@
 import pytest
 
 pytest.importorskip('damadics_msgs.msg')
+from damadics_fd.core.approximator.state import Estimate as CoreEstimate
 from damadics_fd.nodes.joint import Joints, Taker
-from damadics_fd.ros.raw import any_sample, stamp_of, tagged_sample
-from damadics_msgs.msg import Estimate, Measurement
-from rclpy.serialization import serialize_message
+from damadics_fd.ros.raw import (
+    Encoder,
+    EstimateEncoder,
+    any_estimate,
+    any_sample,
+    stamp_of,
+    tagged_sample,
+)
+from damadics_msgs.msg import Estimate, Float64Stamped, Measurement
+from rclpy.serialization import deserialize_message, serialize_message
 
 
 def test_an_echo_is_known_once():
@@ -42,3 +50,31 @@ def test_stamp_and_tag_are_read_from_bytes(tag):
     estimate = Estimate(header=message.header)
     assert stamp_of(serialize_message(estimate)) == 3_000_000_004
     assert stamp_of(b'\0\1\0\0\1') is None
+
+
+@pytest.mark.parametrize('tag', ['', 'LV', 'LV-101', 'Ventil für Öl'])
+def test_encoded_messages_are_those_of_the_middleware(tag):
+    values = [0.1 * n for n in range(14)]
+    estimate = CoreEstimate(3_000_000_004, *values, 4)
+    data = EstimateEncoder().encode(estimate, tag)
+    message = deserialize_message(data, Estimate)
+    assert message.header.frame_id == tag
+    assert message.alpha_hat.tolist() == values[6:9]
+    assert (message.x2, message.progress, message.phase) == (0.0, values[13], 4)
+    assert any_estimate(data) == any_estimate(serialize_message(message)) == (estimate, tag)
+    assert len(data) == len(serialize_message(message))  # padding is not set by the middleware
+    number = Float64Stamped(header=message.header, data=0.7)
+    data = Encoder()(3_000_000_004, tag, 0.7)
+    assert deserialize_message(data, Float64Stamped) == number
+    assert len(data) == len(serialize_message(number))
+
+
+def test_an_encoder_follows_the_tag_and_a_cut_estimate_is_refused():
+    encoder = EstimateEncoder()
+    for tag in ('A', 'longer', 'A'):
+        estimate = CoreEstimate(-1, *[float('nan')] * 14, 255)
+        data = encoder.encode(estimate, tag)
+        assert any_estimate(data)[1] == tag
+        assert any_estimate(data)[0].stamp == -1
+        with pytest.raises(ValueError, match='cut off'):
+            any_estimate(data[:-1])

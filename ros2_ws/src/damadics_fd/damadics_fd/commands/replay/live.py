@@ -16,7 +16,6 @@ from rclpy.duration import Duration
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
-from std_msgs.msg import Header
 from tqdm import tqdm
 
 from damadics_fd.bag.arrays import Columns
@@ -29,8 +28,9 @@ from damadics_fd.core.quality import Refused
 from damadics_fd.core.sample import SIGNALS, Sample
 from damadics_fd.nodes.signature_publisher import SignaturePublisher
 from damadics_fd.ros import qos
-from damadics_fd.ros.conversions import event_message, set_stamp, write_estimate, write_flag
+from damadics_fd.ros.conversions import event_message, header_of, set_stamp, write_flag
 from damadics_fd.ros.entities import Entities
+from damadics_fd.ros.raw import Encoder, EstimateEncoder
 
 CLOCK_PERIOD = 0.01  # [s] of wall time between two messages on /clock
 HEARTBEAT = 10**9  # [ns] of scenario time between two flags without change
@@ -49,7 +49,8 @@ class Judgements:
     def __init__(self, node: Node, monitor: Chain, tag: str) -> None:
         self._monitor = monitor
         self._causes = load_causes()
-        self._header = Header(frame_id=tag)
+        self._tag = tag
+        self._estimates, self._numbers = EstimateEncoder(), Encoder()
         self._estimate = node.create_publisher(EstimateMessage, 'estimate', qos.SAMPLES)
         self._residual = node.create_publisher(Float64Stamped, 'residual', qos.SAMPLES)
         self._threshold = node.create_publisher(Float64Stamped, 'threshold', qos.SAMPLES)
@@ -75,24 +76,20 @@ class Judgements:
         estimate = self._monitor.estimator.update(*sample)
         if isinstance(estimate, Refused):
             return
-        header = self._header
-        set_stamp(header.stamp, sample.stamp)
-        message = EstimateMessage(header=header)
-        write_estimate(estimate, message)
-        self._estimate.publish(message)
+        stamp, tag = sample.stamp, self._tag
+        self._estimate.publish(self._estimates.encode(estimate, tag))
         decision = self._monitor.detector.update(estimate)
-        self._residual.publish(Float64Stamped(header=header, data=decision.residual))
-        self._threshold.publish(Float64Stamped(header=header, data=decision.threshold))
-        shown = decision.shown, sample.stamp // HEARTBEAT
+        self._residual.publish(self._numbers(stamp, tag, decision.residual))
+        self._threshold.publish(self._numbers(stamp, tag, decision.threshold))
+        shown = decision.shown, stamp // HEARTBEAT
         if shown != self._shown:
             self._shown = shown
-            flag = FaultFlag(header=header)
+            flag = FaultFlag(header=header_of(stamp, tag))
             write_flag(decision, flag)
             self._flag.publish(flag)
         for event in decision.events:
-            explained = explain(event, self._causes, header.frame_id)
-            self._event.publish(event_message(explained, header.frame_id))
-        self._signature.update(header, sample.stamp)
+            self._event.publish(event_message(explain(event, self._causes, tag), tag))
+        self._signature.update(stamp, tag)
 
 
 class Player(Node):
