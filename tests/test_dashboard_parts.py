@@ -312,6 +312,35 @@ def test_a_damaged_history_is_moved_aside_and_begun_anew(tmp_path, content):
     history.close()
 
 
+def test_a_history_whose_description_is_no_text_is_moved_aside_each_time_under_a_name(tmp_path):
+    path = tmp_path / 'history.sqlite'
+    for _ in range(2):  # in one second
+        History(path).close()
+        whole = path.read_bytes()
+        path.write_bytes(whole.replace(b'CREATE TABLE event', b'CREATE TABLE \xff\xae\xffnt'))
+        for journal in tmp_path.glob('*-*l'):
+            journal.unlink()
+        History(path).close()
+    assert len(list(tmp_path.glob('history.sqlite.bad-*'))) == 2
+
+
+def test_damaged_rows_of_a_history_are_left_out_and_told(tmp_path):
+    path = tmp_path / 'history.sqlite'
+    history = History(path)
+    history.add(event(FaultEvent.RAISED, 'whole'))
+    history.add(event(FaultEvent.RAISED, 'text'))
+    history.add(event(FaultEvent.RAISED, 'stamp'))
+    history.close()
+    with sqlite3.connect(path) as file:
+        file.execute("UPDATE event SET valve = CAST(x'50ff45' AS TEXT) WHERE text = 'text'")
+        file.execute("UPDATE event SET stamp = 'yesterday' WHERE text = 'stamp'")
+    history = History(path)
+    assert [row['text'] for row in history.latest()] == ['text', 'whole']
+    assert 'P\ufffdE' in history.valves()
+    assert 'left out' in history.problem
+    history.close()
+
+
 @pytest.mark.parametrize('host', ['0.0.0.0', '::', '192.168.1.5', 'plant-pc'])
 def test_the_network_needs_a_token(host, capsys, monkeypatch):
     monkeypatch.delenv('DAMADICS_DASHBOARD_TOKEN', raising=False)

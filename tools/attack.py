@@ -4,7 +4,7 @@
 """
 Attack running nodes: damaged state files, odd requests, processes killed and stopped.
 
-    make attack ARGS='--files 2000 --requests 1000 --signals 200'
+    make attack ARGS='--files 2000 --requests 1000 --signals 200 --pages 500'
 
 Counts what must not happen: a lost alarm, "healthy" for longer than 2 s about old samples, the end
 of a process. Shares no code with the tests. Exit code 1 where anything was found.
@@ -26,6 +26,7 @@ from pathlib import Path
 
 import rclpy
 from ament_index_python.packages import get_package_prefix
+from attacks.page import attack_history, attack_page
 from damadics_msgs.msg import FaultFlag, Measurement
 from damadics_msgs.srv import Acknowledge, Reference, Relearn, ResetAlarm, Shelve
 from lifecycle_msgs.srv import ChangeState
@@ -318,6 +319,8 @@ def main() -> int:
     p.add_argument('--files', type=int, default=2000, help='sets of damaged files (2000)')
     p.add_argument('--requests', type=int, default=1000, help='odd requests (1000)')
     p.add_argument('--signals', type=int, default=200, help='SIGSTOP and SIGKILL (200)')
+    p.add_argument('--pages', type=int, default=500, help='malformed requests to the page (500)')
+    p.add_argument('--histories', type=int, default=500, help='damaged histories (500)')
     p.add_argument('--seed', type=int, default=1)
     options = p.parse_args()
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
@@ -326,9 +329,12 @@ def main() -> int:
         rclpy.init()
         prey = Prey(Path(folder), options.seed)
         try:
-            attack_files(prey, options.files)
-            attack_services(prey, options.requests)
-            attack_signals(prey, options.signals)
+            attack_history(prey.folder, options.histories, prey.random, prey.found)
+            attack_page(prey.folder, options.pages, prey.random, prey.found)
+            if options.files or options.requests or options.signals:
+                attack_files(prey, options.files)
+                attack_services(prey, options.requests)
+                attack_signals(prey, options.signals)
         finally:
             for process in prey.processes.values():
                 process.kill()
@@ -340,7 +346,7 @@ def main() -> int:
     prey.found['tracebacks in the logs'] = traces
     for what, number in sorted(prey.found.items()):
         print(f'{number:7d}  {what}')
-    bad = ('lost', 'ended', 'false', 'not configured', 'no flag', 'no answer')
+    bad = ('lost', 'ended', 'false', 'failed', 'not configured', 'no flag', 'no answer')
     return int(traces > 0 or any(n for what, n in prey.found.items() if what.startswith(bad)))
 
 

@@ -165,9 +165,7 @@ def soak(folder: Path, minutes: float, factor: float) -> list[str]:
         steps = np.diff(stamp)
         lost = round(float((steps / steps.min() - 1.0).sum()))
         late = len(stamp) - len(judged)
-        raised = int(
-            (read_columns(folder / 'bag', f'/{name}/fault_event')['transition'] == 0).sum()
-        )
+        raised = alarms(folder / 'bag', f'/{name}/fault_event')
         print(f'{name}: {len(stamp)} samples, {lost} lost, {late} not judged, {raised} alarms')
         if lost or abs(late) > RATE * factor or raised:
             found.append(f'{name}: {lost} lost, {late} not judged, {raised} alarms')

@@ -19,5 +19,9 @@ def try_shutdown(
     *, context: Context | None = None, uninstall_handlers: bool | None = None
 ) -> None: ...
 def create_node(
-    node_name: str, *, context: Context | None = None, namespace: str | None = None
+    node_name: str,
+    *,
+    context: Context | None = None,
+    namespace: str | None = None,
+    enable_rosout: bool = True,
 ) -> Node: ...

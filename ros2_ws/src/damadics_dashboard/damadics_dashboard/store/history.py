@@ -44,6 +44,7 @@ ACTION = {
     'result': 'TEXT',
 }
 COLUMNS, ACTION_COLUMNS = tuple(EVENT), tuple(ACTION)
+KINDS = {'TEXT': (str,), 'INTEGER': (int,), 'REAL': (int, float)}
 INDEXES = (
     'CREATE INDEX IF NOT EXISTS event_seen ON event (seen)',
     'CREATE INDEX IF NOT EXISTS event_valve ON event (valve)',
@@ -230,7 +231,19 @@ class History:
         except sqlite3.Error as problem:
             self.problem = f'not read: {problem}'
             return []
-        return [kind(**dict(zip(columns, row, strict=True))) for row in found]
+        kinds = EVENT if table == 'event' else ACTION
+        fit = [row for row in found if _fits(row, [kinds[name] for name in columns])]
+        if len(fit) < len(found):
+            self.problem = f'{len(found) - len(fit)} damaged rows are left out'
+        return [kind(**dict(zip(columns, row, strict=True))) for row in fit]
+
+
+def _fits(row: Sequence[str | float | bytes | None], kinds: Sequence[str]) -> bool:
+    """Tell whether values from the file are of the kinds of their columns; SQLite checks none."""
+    return all(
+        value is None or isinstance(value, KINDS[kind])
+        for value, kind in zip(row, kinds, strict=True)
+    )
 
 
 def _where(wanted: Wanted, columns: Sequence[str]) -> tuple[str, tuple[str | float, ...]]:

@@ -5,10 +5,12 @@
 import sqlite3
 import time
 from collections.abc import Mapping, Sequence
+from itertools import count
 from pathlib import Path
 
 PATIENCE = 0.2  # s that another process may hold the file
 SMALL = 50_000_000  # bytes; a file of this size is checked in a moment
+DAMAGED = (sqlite3.DatabaseError, UnicodeDecodeError)  # messages of SQLite quote what is damaged
 Tables = Mapping[str, Mapping[str, str]]  # type of each column by table
 
 
@@ -27,21 +29,34 @@ def open_database(
     path.parent.mkdir(parents=True, exist_ok=True)
     try:
         return _opened(path, tables, more), ''
-    except sqlite3.DatabaseError as problem:
+    except DAMAGED as problem:
         if 'locked' in str(problem) or not path.exists():
             raise OSError(f'{path}: {problem}') from problem
-        aside = path.with_name(time.strftime(f'{path.name}.bad-%Y%m%dT%H%M%S'))
+        aside = _aside(path)
         path.rename(aside)
         for suffix in ('-wal', '-shm'):
             path.with_name(path.name + suffix).unlink(missing_ok=True)
         try:
             return _opened(path, tables, more), f'{problem}; the file of before is {aside}'
-        except sqlite3.DatabaseError as again:
+        except DAMAGED as again:
             raise OSError(f'{path}: {again}') from again
+
+
+def _aside(path: Path) -> Path:
+    """Return a name for a damaged file, which is no other's."""
+    name = time.strftime(f'{path.name}.bad-%Y%m%dT%H%M%S')
+    names = (f'{name}-{number}' if number else name for number in count())
+    return next(path.with_name(one) for one in names if not path.with_name(one).exists())
+
+
+def _text(data: bytes) -> str:
+    """Read a text, of which a byte may be damaged."""
+    return data.decode(errors='replace')
 
 
 def _opened(path: Path, tables: Tables, more: Sequence[str]) -> sqlite3.Connection:
     database = sqlite3.connect(path, timeout=PATIENCE, check_same_thread=False)
+    database.text_factory = _text
     try:
         database.execute('PRAGMA journal_mode=WAL')
         database.execute('PRAGMA synchronous=NORMAL')
@@ -58,7 +73,7 @@ def _opened(path: Path, tables: Tables, more: Sequence[str]) -> sqlite3.Connecti
             (state,) = database.execute('PRAGMA quick_check(1)').fetchone()
             if state != 'ok':
                 raise sqlite3.DatabaseError(state)
-    except sqlite3.Error:
+    except DAMAGED:
         database.close()
         raise
     return database
