@@ -69,8 +69,8 @@ def any_estimate(data: bytes) -> tuple[Estimate, str]:
     :raises ValueError: where it is not that.
     """
     if data[:2] == LITTLE_ENDIAN:
-        stamp, (*values, phase), tag = _fields(data, ESTIMATE, 'estimate')
-        return Estimate(stamp, *values, phase=int(phase)), tag
+        stamp, values, tag = _fields(data, ESTIMATE, 'estimate')
+        return Estimate(stamp, *values), tag  # type: ignore[arg-type]  # the phase is an integer
     message = deserialize_message(data, EstimateMessage)
     return read_estimate(message), message.header.frame_id
 
