@@ -12,9 +12,9 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import QoSPolicyKind, QoSProfile
 
-from damadics_fd.core.freshness import ForwardJumps, Freshness
 from damadics_fd.core.text import NAME, plain
 from damadics_fd.ros.entities import Entities
+from damadics_fd.ros.freshness import ForwardJumps, Freshness
 
 FIRST_WORD = 0.8  # s of wall time after the start
 NEXT_WORDS = 30.0  # s

@@ -9,13 +9,13 @@ from pathlib import Path
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
 
-from damadics_fd.core.freshness import default_max_age
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.text import NAME, plain
 from damadics_fd.nodes.input_watch import InputWatch
 from damadics_fd.ros import own_services
 from damadics_fd.ros.diagnostics import Diagnostics, Level, Report
 from damadics_fd.ros.entities import Entities
+from damadics_fd.ros.freshness import default_max_age
 from damadics_fd.ros.parameter_files import files_of, says_nothing
 from damadics_fd.ros.parameters import Parameters, declare_settings
 from damadics_fd.ros.spin import SpinnableNode, StartError

@@ -13,7 +13,7 @@ from std_msgs.msg import Header
 from damadics_fd.causes import CauseTable, CauseTableError, load_causes
 from damadics_fd.core.record import Array, Ints, Saved
 from damadics_fd.core.settings import Settings
-from damadics_fd.core.signature.cause import own_alarm_ready
+from damadics_fd.core.signature.own_alarm import own_alarm_ready
 from damadics_fd.core.signature.signature import Signature
 from damadics_fd.core.stamps import another_run
 from damadics_fd.ros import qos

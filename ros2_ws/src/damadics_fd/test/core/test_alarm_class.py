@@ -20,7 +20,8 @@ from damadics_fd.core.decision.detector import Detector
 from damadics_fd.core.monitor import run
 from damadics_fd.core.result import Result
 from damadics_fd.core.settings import Settings
-from damadics_fd.core.signature.state import CAUSES, SignatureSettings
+from damadics_fd.core.signature.settings import SignatureSettings
+from damadics_fd.core.signature.state import CAUSES
 
 from .test_alarm import Valve
 

@@ -2,11 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 import numpy as np
 import pytest
+from damadics_fd.core.signature.settings import SignatureSettings
 from damadics_fd.core.signature.signature import Signature
-from damadics_fd.core.signature.state import SignatureSettings
 from damadics_fd.core.valve.plug import recoveries
 from damadics_fd.figures import valve_signature
 from damadics_fd.figures.valve_signature import ForceMap, force_over_position
+
+from ..signature.feed import feed
 
 C = SignatureSettings()
 
@@ -56,8 +58,7 @@ def test_picture_is_written_and_nothing_learned_is_refused(tmp_path):
     force_map = ForceMap(signature)
     with pytest.raises(RuntimeError, match='no signature has been learned'):
         force_over_position(force_map, signature, tmp_path / 'a.png', 'V')
-    for row in data:
-        signature.update(int(row['stamp']), float(row['x1']), float(row['ps']), float(row['dp']))
+    feed(signature, *(data[name] for name in ('stamp', 'x1', 'ps', 'dp')))
     force_map.add(data)
     path = force_over_position(force_map, signature, tmp_path / 'new' / 'a.png', 'V')
     assert path.read_bytes()[:4] == b'\x89PNG' and path.stat().st_size > 20_000

@@ -2,11 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """The compiled evidence against the specification written down literally with numpy."""
 
+import ast
+import inspect
+from pathlib import Path
+
 import numpy as np
 import pytest
 from damadics_fd.core.linalg import cholesky, forward, inverse
 from damadics_fd.core.signature import state as st
-from damadics_fd.core.signature.evidence import evaluate, joint_change
+from damadics_fd.core.signature.evidence import evaluate
+from damadics_fd.core.signature.settings import SignatureSettings
+from damadics_fd.core.signature.size import joint_change
 from damadics_fd.core.signature.state import (
     N_COL,
     N_HYP,
@@ -19,13 +25,11 @@ from damadics_fd.core.signature.state import (
     SET_MID,
     SIGN,
     SIGN_T,
-    STATE_DTYPE,
     X1,
     X1_T,
     G,
-    SignatureSettings,
+    State,
     V,
-    settings_record,
 )
 from damadics_fd.core.signature.sums import accumulate
 
@@ -164,13 +168,12 @@ def test_evidence_equals_the_specification(case, eps, b_r, b_p):
     phi, w, v = blocks(rng, 60)
     theta, J0 = reference_posterior(rng)
     r = CASES[case](phi) + SIGMA * rng.standard_normal(60) / np.sqrt(w)
-    c = settings_record(SignatureSettings())[0]
-    state = np.zeros(1, STATE_DTYPE)
-    s = state[0]
+    c = SignatureSettings().record()[0]
+    s = State.new()
     s.theta[:], s.J0[:, :], s.sigma = theta, J0, SIGMA
     forget = 1.0 - 1.0 / 30.0
     for k in range(60):
-        s.ph[:], s.w, s.v = phi[k], w[k], v[k]
+        s.block.ph[:], s.block.w, s.block.v = phi[k], w[k], v[k]
         accumulate(s, SET_MID, forget, r[k])
     D = evaluate(s, c, SET_MID, eps, b_r, b_p)
     expected, p, value, std = specification(phi, w, v, r, forget, theta, J0, eps, b_r, b_p)
@@ -190,11 +193,11 @@ def test_evidence_of_growing_changes_equals_the_specification(column, growing):
     phi[:, SIGN_T], phi[:, X1_T] = phi[:, SIGN] * t, phi[:, X1] * t
     r = 0.02 * phi[:, column] * (t if growing else 1.0)
     r = r + SIGMA * rng.standard_normal(40) / np.sqrt(w)
-    c = settings_record(SignatureSettings())[0]
-    s = np.zeros(1, STATE_DTYPE)[0]
+    c = SignatureSettings().record()[0]
+    s = State.new()
     s.theta[:], s.J0[:, :], s.sigma, s.t = theta, J0, SIGMA, 8_000_000_000
     for k in range(40):
-        s.ph[:], s.w, s.v = phi[k], w[k], v[k]
+        s.block.ph[:], s.block.w, s.block.v = phi[k], w[k], v[k]
         accumulate(s, SET_ALARM, 1.0 - 1.0 / 30.0, r[k])
     D = evaluate(s, c, SET_ALARM, 0.2, 0.0, 0.0)
     expected, p, value, std = specification(
@@ -211,8 +214,8 @@ def test_joint_change_separates_spring_preload_and_friction():
     rng = np.random.default_rng(5)
     phi, w, v = blocks(rng, 400)
     theta, J0 = reference_posterior(rng)
-    c = settings_record(SignatureSettings())[0]
-    s = np.zeros(1, STATE_DTYPE)[0]
+    c = SignatureSettings().record()[0]
+    s = State.new()
     s.theta[:], s.J0[:, :], s.sigma = theta, J0 * 100.0, SIGMA
     change = (
         0.01 * phi[:, X1]
@@ -220,7 +223,7 @@ def test_joint_change_separates_spring_preload_and_friction():
         + 0.3 * (theta[SIGN] * phi[:, SIGN] + theta[V] * phi[:, V])
     )
     for k in range(400):
-        s.ph[:], s.w, s.v = phi[k], w[k], v[k]
+        s.block.ph[:], s.block.w, s.block.v = phi[k], w[k], v[k]
         accumulate(s, SET_MID, 1.0, change[k] + SIGMA * rng.standard_normal() / np.sqrt(w[k]))
     assert joint_change(s, c, SET_MID)
     expected = np.array([0.01, 0.004 * c.force_scale, 0.3])
@@ -228,7 +231,47 @@ def test_joint_change_separates_spring_preload_and_friction():
     assert np.all(s.now_std < [0.002, 4.0, 0.05])
 
 
-def test_records_read_the_same_uncompiled():
-    """A field that hides a method of numpy.record would differ between both ways to run."""
-    for dtype in (STATE_DTYPE, st.SETTINGS_DTYPE):
-        assert not set(dtype.names) & set(dir(np.generic))
+def test_settings_read_the_same_uncompiled():
+    """A setting that hides a method of numpy.record would differ between both ways to run."""
+    assert not set(SignatureSettings().record().dtype.names) & set(dir(np.generic))
+
+
+def test_every_field_of_the_state_is_written_by_one_file():
+    room = Path(inspect.getfile(State)).parent
+    writers = {name: set() for name in State.names()}
+    for source in room.glob('*.py'):
+        for function in ast.walk(ast.parse(source.read_text('utf-8'))):
+            if isinstance(function, ast.FunctionDef):
+                for name in written(function) & writers.keys():
+                    writers[name].add(source.name)
+    del writers['block'], writers['work']  # scratch
+    assert {name: files for name, files in writers.items() if len(files) != 1} == {}
+
+
+def written(function: ast.FunctionDef) -> set[str]:
+    """Return the fields of `s` that a function assigns to, by another name too."""
+    views, fields = {}, set()
+    for node in ast.walk(function):
+        if not isinstance(node, ast.AugAssign | ast.AnnAssign | ast.Assign):
+            continue
+        for target in node.targets if isinstance(node, ast.Assign) else [node.target]:
+            pairs = [(target, node.value)]
+            if isinstance(target, ast.Tuple):
+                values = getattr(node.value, 'elts', [node.value] * len(target.elts))
+                pairs = zip(target.elts, values, strict=True)
+            for to, value in pairs:
+                if isinstance(to, ast.Name):
+                    views[to.id] = field_of(value, views)
+                else:
+                    fields.add(field_of(to, views))
+    return fields
+
+
+def field_of(node: ast.expr, views: dict[str, str]) -> str:
+    """Return the field of `s` that an expression is a view of, '' for none."""
+    while isinstance(node, ast.Subscript):
+        node = node.value
+    if isinstance(node, ast.Name):
+        return views.get(node.id, '')
+    own = isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name)
+    return node.attr if own and node.value.id == 's' else ''

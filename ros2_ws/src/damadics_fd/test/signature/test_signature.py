@@ -15,10 +15,13 @@ import numpy as np
 import pytest
 from damadics_fd.core.signature import state as st
 from damadics_fd.core.signature.air import strokes_agree
+from damadics_fd.core.signature.settings import SignatureSettings
 from damadics_fd.core.signature.signature import Signature
-from damadics_fd.core.signature.state import CAUSES, SignatureSettings
+from damadics_fd.core.signature.state import CAUSES
 from damadics_fd.core.signature.step import BLOCK, CHANGED, QUIET
 from damadics_fd.core.valve.plug import POSITION, recoveries
+
+from .feed import feed
 
 DT = 0.005
 C = SignatureSettings()
@@ -77,11 +80,7 @@ def valve(
 
 def run(columns, signature=None, alarm_at=np.inf, keep=slice(None)):
     signature = signature or Signature(C)
-    results = [
-        signature.update(int(t), float(x), float(ps), float(dp), True, t * 1e-9 >= alarm_at)
-        for t, x, ps, dp in zip(*(column[keep] for column in columns), strict=True)
-    ]
-    return signature, np.array(results)
+    return signature, feed(signature, *(column[keep] for column in columns), alarm_at)
 
 
 def test_a_healthy_valve_is_learned_verified_and_left_alone():
@@ -135,9 +134,10 @@ def test_an_alarm_of_the_approximator_is_explained_during_verification():
 
 
 def test_an_unfounded_alarm_is_called_unconfirmed_and_can_be_cleared():
-    signature, _ = run(valve(seed=6), alarm_at=130.0)
+    columns = valve(seed=6)
+    signature, _ = run(columns, alarm_at=130.0, keep=slice(0, -200))
     assert signature.view().cause == 'unconfirmed'
-    signature.clear()
+    run(columns, signature, keep=slice(-200, None))
     assert signature.view().state == st.STATE_MONITOR and signature.view().cause == 'none'
 
 
@@ -238,7 +238,7 @@ def test_old_stamps_change_nothing():
     columns = valve(seconds=20.0)
     signature, _ = run(columns)
     before = signature.state.tobytes()
-    assert signature.update(int(columns[0][-10]), 0.5, 1e5, 9e5) == QUIET
+    assert run(columns, signature, keep=slice(-10, -9))[1] == QUIET
     assert signature.state.tobytes() == before
 
 

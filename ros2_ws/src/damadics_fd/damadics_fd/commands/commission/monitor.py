@@ -32,7 +32,7 @@ from damadics_fd.core.identified import LIMITED, OK, REFUSED, FaultFree, Identif
 from damadics_fd.core.monitor import run
 from damadics_fd.core.result import Columns, Result
 from damadics_fd.core.settings import Settings
-from damadics_fd.core.signature.state import MIN_RATE
+from damadics_fd.core.signature.settings import MIN_RATE
 
 SAME_SPRING = 0.05  # share by which the stiffness of recordings of one valve may differ
 SEEN = 1.5  # factor on the largest ratio seen, where no limit can be extrapolated

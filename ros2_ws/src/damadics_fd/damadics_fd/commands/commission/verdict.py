@@ -10,7 +10,7 @@ import numpy as np
 from damadics_fd.commands.commission.balance import Balance, K
 from damadics_fd.commands.commission.lag import trust
 from damadics_fd.core.settings import Settings
-from damadics_fd.core.signature.state import SignatureSettings
+from damadics_fd.core.signature.settings import SignatureSettings
 
 PARTS = 4  # of the moving time, compared with each other
 CERTAIN = 4.0  # standard deviations

@@ -16,8 +16,9 @@ from damadics_fd.core.decision.events import Decision, Event
 from damadics_fd.core.decision.judge import State, judge, show
 from damadics_fd.core.record import Array, Plain, Saved
 from damadics_fd.core.settings import Settings
+from damadics_fd.core.signature.settings import SignatureSettings
 from damadics_fd.core.signature.signature import Signature
-from damadics_fd.core.signature.state import NO_CLASSES, SignatureSettings
+from damadics_fd.core.signature.state import NO_CLASSES
 
 ACCEPTED = np.zeros(1, np.uint8)
 _VALUES = attrgetter(*Estimate.names())

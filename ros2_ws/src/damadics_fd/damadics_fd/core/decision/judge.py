@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Judge estimates: threshold, alarm, signature and class; the hot loop of the detector."""
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,7 +15,10 @@ from damadics_fd.core.jit import jit, layer
 from damadics_fd.core.modes import MONITOR, PHASE_HOLD, PHASE_PAPER
 from damadics_fd.core.record import Array, Rows
 from damadics_fd.core.settings import Settings
+from damadics_fd.core.signature import own_alarm
 from damadics_fd.core.signature import step as signature_step
+from damadics_fd.core.signature.settings import SignatureSettings
+from damadics_fd.core.signature.state import State as Known
 
 LARGE = 1e9  # ratio to a threshold of zero
 STIR = 0.01  # of the stroke: less is no motion of the stem
@@ -33,7 +34,7 @@ class State(Votes, Alarm):
 
 
 @layer
-def step(s: State, c: Settings, g: Any, gc: Any, e: Estimate, d: Decision) -> None:
+def step(s: State, c: Settings, g: Known, gc: SignatureSettings, e: Estimate, d: Decision) -> None:
     """
     Judge one estimate.
 
@@ -58,7 +59,7 @@ def step(s: State, c: Settings, g: Any, gc: Any, e: Estimate, d: Decision) -> No
     cause = g.cause
     ready = e.phase not in (PHASE_PAPER, PHASE_HOLD)
     signature_step.step(g, gc, e.stamp, e.x1, e.ps, e.dp, ready, s.active or s.latched)
-    own = signature_step.own_level(g, gc)
+    own = own_alarm.own_level(g, gc)
     d.transitions = alarm.step(
         s,
         c,
@@ -69,7 +70,7 @@ def step(s: State, c: Settings, g: Any, gc: Any, e: Estimate, d: Decision) -> No
         max(level, own),
         ratio,
         c.mode_code != MONITOR or e.stamp - s.moved < FRESH,
-        signature_step.persists(g, gc),
+        own_alarm.persists(g, gc),
     )
     present = s.active or s.latched
     if g.cause != cause or not present:
@@ -91,7 +92,7 @@ def step(s: State, c: Settings, g: Any, gc: Any, e: Estimate, d: Decision) -> No
 
 
 @jit
-def class_of(s: State, g: Any, gc: Any, armed: bool) -> int:
+def class_of(s: State, g: Known, gc: SignatureSettings, armed: bool) -> int:
     """
     Return the NAMUR NE 107 class that is shown: the worse of residual and cause.
 
@@ -104,13 +105,13 @@ def class_of(s: State, g: Any, gc: Any, armed: bool) -> int:
     level: int = alarm.level_of(s, armed)
     if not s.flag:
         return level
-    if s.peak < 1.0 and not signature_step.material(g, gc, s.told > alarm.NORMAL):
+    if s.peak < 1.0 and not own_alarm.material(g, gc, s.told > alarm.NORMAL):
         return alarm.NORMAL  # the approximator is content and the change is small
     return max(level, int(gc.ne107[g.cause]))
 
 
 @jit
-def report(s: State, g: Any, gc: Any, e: Estimate, d: Decision) -> None:
+def report(s: State, g: Known, gc: SignatureSettings, e: Estimate, d: Decision) -> None:
     """
     Copy the state of the alarm into a decision.
 
@@ -141,8 +142,8 @@ def report(s: State, g: Any, gc: Any, e: Estimate, d: Decision) -> None:
 def judge(
     s: Rows[State],
     c: Rows[Settings],
-    g: Array,
-    gc: Array,
+    g: Rows[Known],
+    gc: Rows[SignatureSettings],
     reason: NDArray[np.uint8],
     e: Array,
     d: Rows[Decision],
@@ -192,7 +193,13 @@ def judge(
 
 
 @jit
-def show(s: Rows[State], g: Array, gc: Array, e: Rows[Estimate], d: Rows[Decision]) -> None:
+def show(
+    s: Rows[State],
+    g: Rows[Known],
+    gc: Rows[SignatureSettings],
+    e: Rows[Estimate],
+    d: Rows[Decision],
+) -> None:
     """
     Copy the state of the alarm into a decision; `report` for arrays of length 1.
 

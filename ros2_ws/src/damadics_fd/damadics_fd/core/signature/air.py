@@ -9,10 +9,11 @@ as before; a leak of the chamber fills it slower and vents it faster.
 """
 
 import math
-from typing import Any
 
 from damadics_fd.core.jit import jit
-from damadics_fd.core.signature.state import FILL, STROKES, VENT
+from damadics_fd.core.record import Floats
+from damadics_fd.core.signature.settings import SignatureSettings
+from damadics_fd.core.signature.state import FILL, STROKES, VENT, Air, State
 
 P_ATM = 101325.0  # [Pa]
 ALIKE = 0.9  # [1] strokes at full opening differ by 4 % at most, those of ramps by 10 to 40 %
@@ -22,7 +23,7 @@ MIN_STROKE = 0.15  # [1] a shorter stroke may not reach its top rate; holding ag
 
 
 @jit
-def track_air(s: Any, c: Any, learn: bool) -> bool:
+def track_air(s: State, c: SignatureSettings, learn: bool) -> bool:
     """
     Follow the filling and venting of the chamber over the newest three blocks.
 
@@ -64,7 +65,7 @@ def track_air(s: Any, c: Any, learn: bool) -> bool:
 
 
 @jit
-def end_stroke(s: Any, c: Any, learn: bool) -> bool:
+def end_stroke(s: Air, c: SignatureSettings, learn: bool) -> bool:
     """
     Take the second best rate of a stroke into the reference or the latest strokes.
 
@@ -102,7 +103,7 @@ def end_stroke(s: Any, c: Any, learn: bool) -> bool:
 
 
 @jit
-def swing(c: Any) -> float:
+def swing(c: SignatureSettings) -> float:
     """
     Return the chamber pressure that moves the spring over one stroke.
 
@@ -113,7 +114,7 @@ def swing(c: Any) -> float:
 
 
 @jit
-def middle(values: Any, n: int) -> int:
+def middle(values: Floats, n: int) -> int:
     """
     Find the median, which a spike does not move.
 
@@ -132,7 +133,7 @@ def middle(values: Any, n: int) -> int:
 
 
 @jit
-def supply_lost(s: Any, c: Any) -> bool:
+def supply_lost(s: Air, c: SignatureSettings) -> bool:
     """
     Tell whether the chamber fills slower than learned while it vents as before.
 
@@ -150,7 +151,7 @@ def supply_lost(s: Any, c: Any) -> bool:
 
 
 @jit
-def strokes_agree(s: Any) -> bool:
+def strokes_agree(s: Air) -> bool:
     """
     Tell whether the latest strokes filled the chamber alike, as they do at full opening.
 
@@ -166,7 +167,7 @@ def strokes_agree(s: Any) -> bool:
 
 
 @jit
-def supply_change(s: Any, c: Any) -> float:
+def supply_change(s: Air, c: SignatureSettings) -> float:
     """
     Estimate the change of the supply pressure from the filling rate.
 
@@ -180,7 +181,7 @@ def supply_change(s: Any, c: Any) -> float:
 
 
 @jit
-def restart_air(s: Any) -> None:
+def restart_air(s: Air) -> None:
     """
     Judge the rates on strokes to come only.
 
@@ -192,7 +193,7 @@ def restart_air(s: Any) -> None:
 
 
 @jit
-def forget_air(s: Any) -> None:
+def forget_air(s: Air) -> None:
     """
     Learn the rates anew.
 

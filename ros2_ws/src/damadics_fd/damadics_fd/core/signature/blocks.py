@@ -8,9 +8,9 @@ force of a block share their time; a filtered force lags behind by several block
 """
 
 import math
-from typing import Any
 
 from damadics_fd.core.jit import jit
+from damadics_fd.core.signature.settings import SignatureSettings
 from damadics_fd.core.signature.state import (
     LAG,
     N_TABLE,
@@ -24,7 +24,9 @@ from damadics_fd.core.signature.state import (
     TABLE,
     X1,
     X1_T,
+    Blocks,
     G,
+    State,
     V,
 )
 from damadics_fd.core.valve.plug import recovery
@@ -34,7 +36,7 @@ MPA = 1e6
 
 
 @jit
-def plug_gain(c: Any, x: float) -> float:
+def plug_gain(c: SignatureSettings, x: float) -> float:
     """
     Interpolate the plug force per pressure difference.
 
@@ -47,7 +49,29 @@ def plug_gain(c: Any, x: float) -> float:
 
 
 @jit
-def open_block(s: Any, index: int) -> None:
+def interrupt(s: Blocks) -> None:
+    """
+    Drop the block under construction and those before it.
+
+    :param s: state record.
+    """
+    s.run = 0
+    s.n = 0
+    s.index = -1
+
+
+@jit
+def break_run(s: Blocks) -> None:
+    """
+    Let no block be judged with those before a gap.
+
+    :param s: state record.
+    """
+    s.run = 0
+
+
+@jit
+def open_block(s: Blocks, index: int) -> None:
     """
     Start a new block.
 
@@ -64,7 +88,9 @@ def open_block(s: Any, index: int) -> None:
 
 
 @jit
-def add_sample(s: Any, c: Any, offset: float, x: float, ps: float, dp: float) -> None:
+def add_sample(
+    s: Blocks, c: SignatureSettings, offset: float, x: float, ps: float, dp: float
+) -> None:
     """
     Add one sample to the block under construction.
 
@@ -85,7 +111,7 @@ def add_sample(s: Any, c: Any, offset: float, x: float, ps: float, dp: float) ->
 
 
 @jit
-def close_block(s: Any, c: Any) -> bool:
+def close_block(s: Blocks, c: SignatureSettings) -> bool:
     """
     Finish the block under construction and shift it into the history of three.
 
@@ -126,7 +152,7 @@ def table_node(x: float) -> tuple[int, float]:
 
 
 @jit
-def table_force(s: Any, c: Any, x: float, dp: float) -> float:
+def table_force(s: State, c: SignatureSettings, x: float, dp: float) -> float:
     """
     Return the learned correction of the plug force.
 
@@ -143,7 +169,7 @@ def table_force(s: Any, c: Any, x: float, dp: float) -> float:
 
 
 @jit
-def regressor(s: Any, c: Any, slow: float) -> None:
+def regressor(s: State, c: SignatureSettings, slow: float) -> None:
     """
     Fill the regressor of the model and of every hypothesis.
 
@@ -151,15 +177,15 @@ def regressor(s: Any, c: Any, slow: float) -> None:
     :param c: settings record.
     :param slow: share of the Stribeck friction at this speed.
     """
-    x = s.x
+    x = s.block.x
     dp = s.bdp[1]
     gain = plug_gain(c, x)
     slope = dp * (plug_gain(c, x + SLOPE) - plug_gain(c, x - SLOPE)) / (2.0 * SLOPE)
-    ph = s.ph
+    ph = s.block.ph
     ph[X1] = x + c.preload
     ph[ONE] = 1.0
-    ph[V] = s.v
-    ph[SIGN] = 1.0 if s.v > 0.0 else -1.0
+    ph[V] = s.block.v
+    ph[SIGN] = 1.0 if s.block.v > 0.0 else -1.0
     ph[TABLE : TABLE + N_TABLE] = 0.0
     i, share = table_node(x)
     ph[TABLE + i] = (1.0 - share) * dp * gain
@@ -175,7 +201,20 @@ def regressor(s: Any, c: Any, slow: float) -> None:
 
 
 @jit
-def judge_block(s: Any, c: Any) -> None:
+def let_grow(s: State, tau: float) -> None:
+    """
+    Fill the columns of changes that grow.
+
+    :param s: state record; ph is written.
+    :param tau: time since the alarm, as `growth_time` counts it.
+    """
+    ph = s.block.ph
+    ph[SIGN_T] = ph[SIGN] * tau
+    ph[X1_T] = ph[X1] * tau
+
+
+@jit
+def judge_block(s: State, c: SignatureSettings) -> None:
     """
     Classify the middle block as moving, standing or neither and build its regressor.
 
@@ -191,21 +230,21 @@ def judge_block(s: Any, c: Any) -> None:
     in_range = c.range_gate < low and high < 1.0 - c.range_gate
     step = 0.5 * c.v_min * c.block
     fast = c.v_min <= abs(v) < c.v_max
-    s.x = x
-    s.u = s.bu[1]
-    s.v = v
-    s.moving = 0
-    s.standing = 0
+    s.block.x = x
+    s.block.u = s.bu[1]
+    s.block.v = v
+    s.block.moving = 0
+    s.block.standing = 0
     if s.run <= 3:
         s.slide = 0  # the first block after a gap
     # equal signs drop reversals, the minimum drops break-away blocks
     if in_range and fast and d1 * d2 > 0.0 and min(abs(d1), abs(d2)) >= step:
-        s.moving = 1
+        s.block.moving = 1
         s.slide += 1
         slow = math.exp(-((v / c.v_stribeck) ** 2))
-        s.w = 1.0 / (1.0 + c.stribeck_weight * slow)
+        s.block.w = 1.0 / (1.0 + c.stribeck_weight * slow)
         regressor(s, c, slow)
         return
     s.slide = 0
     if in_range and abs(v) < c.v_min and max(abs(d1), abs(d2)) < 3.0 * step:
-        s.standing = 1
+        s.block.standing = 1

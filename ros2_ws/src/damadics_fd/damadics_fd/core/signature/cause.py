@@ -3,23 +3,27 @@
 """From evidence to a named cause: families first, "undetermined" as an honest answer."""
 
 import math
-from typing import Any
 
 from damadics_fd.core.jit import jit, layer
 from damadics_fd.core.signature.cues import stick_evidence
-from damadics_fd.core.signature.evidence import evaluate, joint_change
-from damadics_fd.core.signature.size import physical_value
+from damadics_fd.core.signature.evidence import clear_set, due, evaluate
+from damadics_fd.core.signature.settings import SignatureSettings
+from damadics_fd.core.signature.size import joint_change, physical_value
 from damadics_fd.core.signature.state import (
     CAUSE_ELASTIC,
     CAUSE_FRICTION_DOWN,
     CAUSE_FRICTION_UP,
+    CAUSE_NONE,
     CAUSE_PRELOAD,
     CAUSE_SPRING_SOFTER,
     CAUSE_SPRING_STIFFER,
     CAUSE_STICK_PLAY,
+    CAUSE_SUPPLY,
     CAUSE_UNCONFIRMED,
+    CAUSE_UNDETERMINED,
     FAMILY_ELASTIC,
     FAMILY_FRICTION,
+    FAMILY_SUPPLY,
     FAMILY_UNCONFIRMED,
     FAMILY_UNDETERMINED,
     FRICTION,
@@ -30,12 +34,11 @@ from damadics_fd.core.signature.state import (
     SET_FAST,
     SET_SLOW,
     SPRING,
-    STATE_MONITOR,
     X1,
+    Cause,
+    State,
 )
-from damadics_fd.core.signature.sums import clear_set
 
-SECOND = 1_000_000_000  # [ns]
 FULL_EVIDENCE = 18.0  # blocks since the alarm, from which the fast set holds nothing older
 NULL_MOVING = 12.0  # blocks since the alarm
 NULL_STICK = 1.5  # stick range / reference; a healthy valve reaches 1.44
@@ -43,60 +46,72 @@ NULL_D = 15.0  # less evidence of the moving stem than this is none
 FLIP = 10  # evaluated blocks in a row that overturn a firm family
 P_LONG = 0.99  # names a family by the long record alone
 P_STICK = 0.96
+P_SUPPLY = 0.95
 STAGE2_EVIDENCE = 30.0
 STAGE2_STRIDE = 5
 STAGE2_SETTLED, STAGE2_STRONG = 2, 3
 SETTLED = 30.0  # [s] after the alarm: from then on the long record sizes a friction change
 STRONG = 1.0  # friction change of which the long record begins anew then
 TELLING = 0.2  # of the stroke: range that tells the members of the elastic family apart
-D_VERIFY = 12.0  # largest D expected of a right model
 
 
 @jit
-def watch(s: Any, c: Any) -> None:
+def forget_cause(s: Cause) -> None:
     """
-    Look for a change on the three memories before any alarm.
-
-    A set is evaluated as often as its memory can change, and at every block once D is not
-    small. Where the whole misfit is below a limit, D is below it too and need not be computed.
-
-    :param s: state record; own is set if the own alarm is due.
-    :param c: settings record.
-    """
-    for m in range(SET_SLOW + 1):
-        s.due[m] += 1
-        if s.rr[m] < D_VERIFY * s.sigma * s.sigma:
-            s.D[m] = 0.0
-            s.over[m] = 0
-            continue
-        if s.D[m] < 0.5 * c.d_alarm and s.due[m] < c.memory[m] / 10.0:
-            continue
-        s.due[m] = 0
-        D = evaluate(s, c, m, c.model_error, 0.0, 0.0)
-        s.d_max[m] = max(s.d_max[m], D)
-        s.over[m] = s.over[m] + 1 if c.d_alarm < D else 0
-        if m == SET_SLOW and joint_change(s, c, m):
-            s.now_t = s.t
-        if s.over[m] >= c.n_alarm and s.state == STATE_MONITOR and own_alarm_ready(s, c):
-            s.own = 1
-            s.own_t = s.t
-
-
-@jit
-def own_alarm_ready(s: Any, c: Any) -> bool:
-    """
-    Tell whether the force model is good enough for an own alarm.
+    Set value, deviation and confidence to 0: unknown.
 
     :param s: state record.
-    :param c: settings record.
-    :return: False where VERIFY found a poor plug force model or the user switched it off.
     """
-    allowed: bool = c.own_alarm != 0 and s.verified != 0 and s.kappa <= c.kappa_max
-    return allowed
+    s.cause_value = 0.0
+    s.cause_std = 0.0
+    s.confidence = 0.0
 
 
 @jit
-def decide(s: Any, c: Any) -> None:
+def begin_judgement(s: Cause) -> None:
+    """
+    Judge an alarm that begins.
+
+    :param s: state record.
+    """
+    s.stage2 = 0
+    s.run_f = 0
+    s.run_e = 0
+    s.family = FAMILY_UNDETERMINED
+    s.cause = CAUSE_UNDETERMINED
+    s.second = 0
+    forget_cause(s)
+
+
+@jit
+def end_judgement(s: Cause) -> None:
+    """
+    Name no cause: there is no alarm.
+
+    :param s: state record.
+    """
+    s.stage2 = 0
+    s.family = FAMILY_UNDETERMINED
+    s.cause = CAUSE_NONE
+    forget_cause(s)
+
+
+@jit
+def name_supply(s: Cause, change: float) -> None:
+    """
+    Report a loss of supply pressure.
+
+    :param s: state record.
+    :param change: [Pa].
+    """
+    s.family = FAMILY_SUPPLY
+    s.cause = CAUSE_SUPPLY
+    s.cause_value = change
+    s.confidence = P_SUPPLY
+
+
+@jit
+def decide(s: State, c: SignatureSettings) -> None:
     """
     Judge the alarm after a moving block, or a standing one that widened the stick range.
 
@@ -143,7 +158,7 @@ def decide(s: Any, c: Any) -> None:
 
 
 @jit
-def moving_unchanged(s: Any, c: Any, D: float) -> bool:
+def moving_unchanged(s: State, c: SignatureSettings, D: float) -> bool:
     """
     Tell whether the moving stem shows no change, neither of late nor on the long record.
 
@@ -158,7 +173,7 @@ def moving_unchanged(s: Any, c: Any, D: float) -> bool:
 
 
 @jit
-def doubt(s: Any, c: Any) -> None:
+def doubt(s: State, c: SignatureSettings) -> None:
     """
     Say so if the moving valve does not confirm an alarm.
 
@@ -172,7 +187,7 @@ def doubt(s: Any, c: Any) -> None:
 
 
 @jit
-def name_stick(s: Any, p: float) -> None:
+def name_stick(s: State, p: float) -> None:
     """
     Report friction or play that only the standing stem shows.
 
@@ -186,7 +201,7 @@ def name_stick(s: Any, p: float) -> None:
 
 
 @jit
-def name_friction(s: Any, c: Any, m: int, p: float) -> None:
+def name_friction(s: State, c: SignatureSettings, m: int, p: float) -> None:
     """
     Report a firm friction change.
 
@@ -203,7 +218,7 @@ def name_friction(s: Any, c: Any, m: int, p: float) -> None:
 
 
 @jit
-def name_elastic(s: Any, c: Any, m: int, p: float) -> None:
+def name_elastic(s: State, c: SignatureSettings, m: int, p: float) -> None:
     """
     Report a firm change of the elastic family, by the spring until stage 2 knows better.
 
@@ -222,7 +237,7 @@ def name_elastic(s: Any, c: Any, m: int, p: float) -> None:
 
 
 @jit
-def likeliest(s: Any, m: int) -> int:
+def likeliest(s: State, m: int) -> int:
     """
     Return the likeliest hypothesis of the elastic family.
 
@@ -252,7 +267,7 @@ def cause_of(h: int, value: float) -> int:
 
 
 @layer
-def second_stage(s: Any, c: Any) -> None:
+def second_stage(s: State, c: SignatureSettings) -> None:
     """
     Name the member of the elastic family from a longer record after the alarm.
 
@@ -271,13 +286,10 @@ def second_stage(s: Any, c: Any) -> None:
             s.stage2 = STAGE2_STRONG
             clear_set(s, SET_SLOW)  # it holds the growth of the fault; of a small one all counts
     m = SET_SLOW
-    s.due[m] += 1
-    if s.due[m] < STAGE2_STRIDE or s.ne[m] < STAGE2_EVIDENCE:
+    if not due(s, m, STAGE2_STRIDE, s.ne[m] >= STAGE2_EVIDENCE):
         return
-    s.due[m] = 0
     D = evaluate(s, c, m, c.model_error_stage2, 0.0, 0.0)
-    if joint_change(s, c, m):
-        s.now_t = s.t
+    joint_change(s, c, m)
     if c.d_decide >= D:
         return
     if s.family in (FAMILY_UNDETERMINED, FAMILY_UNCONFIRMED):
@@ -302,7 +314,7 @@ def second_stage(s: Any, c: Any) -> None:
 
 
 @jit
-def ranged(s: Any, m: int) -> bool:
+def ranged(s: State, m: int) -> bool:
     """
     Tell whether the stem went far enough to tell spring, preload and sensors apart.
 

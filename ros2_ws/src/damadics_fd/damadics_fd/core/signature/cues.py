@@ -2,11 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Physical cues: what only friction, and what friction never can do."""
 
-from typing import Any
-
 from damadics_fd.core.jit import jit
 from damadics_fd.core.signature.blocks import table_force
-from damadics_fd.core.signature.state import ONE, SIGN, X1
+from damadics_fd.core.signature.settings import SignatureSettings
+from damadics_fd.core.signature.state import ONE, SIGN, X1, Cues, State
 
 B_MAX = 16.0  # enough to decide alone, unless the moving stem contradicts
 EPISODE = 0.004  # [1] a standing stem may creep this far
@@ -15,7 +14,7 @@ PASSIVITY_HOLD = 10_000_000_000  # [ns]
 
 
 @jit
-def track_stick(s: Any) -> None:
+def track_stick(s: State) -> None:
     """
     Widen the range of force that the standing stem has borne.
 
@@ -23,13 +22,13 @@ def track_stick(s: Any) -> None:
 
     :param s: state record.
     """
-    if s.standing == 0:
+    if s.block.standing == 0:
         s.stick = 0
         return
-    e = s.u - s.x
-    if s.stick == 0 or abs(s.x - s.stick_x) > EPISODE:
+    e = s.block.u - s.block.x
+    if s.stick == 0 or abs(s.block.x - s.stick_x) > EPISODE:
         s.stick = 1
-        s.stick_x = s.x
+        s.stick_x = s.block.x
         s.stick_low = e
         s.stick_high = e
     s.stick_low = min(s.stick_low, e)
@@ -38,7 +37,51 @@ def track_stick(s: Any) -> None:
 
 
 @jit
-def stick_evidence(s: Any) -> float:
+def restart_range(s: Cues) -> None:
+    """
+    Look at the stick range anew.
+
+    :param s: state record.
+    """
+    s.r_max = 0.0
+
+
+@jit
+def forget_stick(s: Cues) -> None:
+    """
+    Look at the stick range anew, of a stem that comes to rest anew.
+
+    :param s: state record.
+    """
+    s.r_max = 0.0
+    s.stick = 0
+
+
+@jit
+def restart_cues(s: Cues, t: int) -> None:
+    """
+    Look for cues on an alarm that begins.
+
+    :param s: state record.
+    :param t: [ns] now.
+    """
+    forget_stick(s)
+    s.b_p_until = t
+
+
+@jit
+def shift_cues(s: Cues, shift: int) -> None:
+    """
+    Follow a clock that was set back.
+
+    :param s: state record.
+    :param shift: [ns] new time minus old time.
+    """
+    s.b_p_until += shift
+
+
+@jit
+def stick_evidence(s: State) -> float:
     """
     Return the log evidence of the stick range for friction.
 
@@ -50,7 +93,7 @@ def stick_evidence(s: Any) -> float:
 
 
 @jit
-def check_passivity(s: Any, c: Any) -> None:
+def check_passivity(s: State, c: SignatureSettings) -> None:
     """
     Note a stem that moved against its force residual: friction cannot do that.
 

@@ -9,14 +9,13 @@ division. The result equals the restricted least squares of each hypothesis term
 """
 
 import math
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from damadics_fd.core.jit import jit
 from damadics_fd.core.linalg import cholesky, forward, inverse
-from damadics_fd.core.signature.size import SMALL_FRICTION
+from damadics_fd.core.record import Ints
+from damadics_fd.core.signature.settings import SignatureSettings
 from damadics_fd.core.signature.state import (
     FRICTION,
     N_COL,
@@ -27,27 +26,30 @@ from damadics_fd.core.signature.state import (
     SET_ALARM,
     SIGN,
     SIGN_T,
+    SMALL_FRICTION,
     SPRING,
     TABLE,
     X1,
     X1_T,
+    Evidence,
+    State,
     V,
 )
-from damadics_fd.core.signature.sums import growth_time
+from damadics_fd.core.signature.sums import clear_sums, growth_time
 
 # column of hypotheses 3 to 7: 1, position gain, chamber pressure, P1 - P2, position offset
 COLUMN = np.array([-1, -1, -1, ONE, N_REF + 3, N_REF, N_REF + 1, N_REF + 2])
 # columns of the hypotheses with several
 FRICTION_COLUMNS = np.array([SIGN, V, SIGN_T])
 SPRING_COLUMNS = np.array([X1, X1_T])
-JOINT_COLUMNS = np.array([X1, ONE, SIGN, V])
 MIN_EVIDENCE = 4.0  # blocks
 CONFLICT = 3.0  # log odds of the moving stem against friction that outweigh the stick range
+D_VERIFY = 12.0  # largest D expected of a right model
 SMALL = 2e-3  # [1] tolerance of the exclusions
 
 
 @jit
-def eliminate_reference(s: Any, m: int, iv: float) -> float:
+def eliminate_reference(s: State, m: int, iv: float) -> float:
     """
     Eliminate the error of the reference from one set.
 
@@ -59,7 +61,7 @@ def eliminate_reference(s: Any, m: int, iv: float) -> float:
     """
     S = s.S[m]
     q = s.q[m]
-    L, Y, y0 = s.L[0], s.Y[0], s.y0
+    L, Y, y0 = s.work.L[0], s.work.Y[0], s.work.y0
     n = len(y0)
     for i in range(n):
         for j in range(i + 1):
@@ -84,16 +86,16 @@ def eliminate_reference(s: Any, m: int, iv: float) -> float:
         g = iv * q[i]
         for k in range(N_REF):
             g -= Y[k, i] * y0[k]
-        s.gv[i] = g
+        s.work.gv[i] = g
         a = iv * S[i, i]
         for k in range(N_REF):
             a -= Y[k, i] * Y[k, i]
-        s.Gm[0, i, i] = max(a, 0.0)
+        s.work.Gm[0, i, i] = max(a, 0.0)
     return max(J_0, 0.0)
 
 
 @jit
-def cross_information(s: Any, m: int, iv: float, i: int, j: int) -> float:
+def cross_information(s: State, m: int, iv: float, i: int, j: int) -> float:
     """
     Return one off-diagonal entry of the information matrix after `eliminate_reference`.
 
@@ -106,16 +108,16 @@ def cross_information(s: Any, m: int, iv: float, i: int, j: int) -> float:
     """
     a: float = iv * s.S[m][i, j]
     for k in range(N_REF):
-        a -= s.Y[0, k, i] * s.Y[0, k, j]
+        a -= s.work.Y[0, k, i] * s.work.Y[0, k, j]
     return a
 
 
 @jit
 def solve_group(
-    s: Any,
+    s: State,
     m: int,
     iv: float,
-    columns: NDArray[np.int64],
+    columns: Ints,
     count: int,
     prior: tuple[float, float, float, float],
 ) -> float:
@@ -130,25 +132,25 @@ def solve_group(
     :param prior: standard deviation of each change.
     :return: misfit that the hypothesis explains; negative if the sums are not usable.
     """
-    H, d = s.H[0], s.d
+    H, d = s.work.H[0], s.work.d
     for i in range(count):
-        H[i, i] = s.Gm[0, columns[i], columns[i]] + 1.0 / (prior[i] * prior[i])
+        H[i, i] = s.work.Gm[0, columns[i], columns[i]] + 1.0 / (prior[i] * prior[i])
         for j in range(i):
             H[i, j] = cross_information(s, m, iv, columns[i], columns[j])
         d[i] = 0.0
-    if not inverse(H, s.W[0], count):
+    if not inverse(H, s.work.W[0], count):
         return -1.0
     explained = 0.0
     for i in range(count):
         for j in range(count):
-            d[i] += H[i, j] * s.gv[columns[j]]
-        explained += d[i] * s.gv[columns[i]]
+            d[i] += H[i, j] * s.work.gv[columns[j]]
+        explained += d[i] * s.work.gv[columns[i]]
     return max(explained, 0.0)
 
 
 @jit
 def combine(
-    s: Any, count: int, first: float, a: float, b: float, scale: float
+    s: State, count: int, first: float, a: float, b: float, scale: float
 ) -> tuple[float, float]:
     """
     Return the change first d0 + a d1 + b d2 of the last group in units of `scale`.
@@ -164,14 +166,14 @@ def combine(
     weight = (first, a, b)
     value, variance = 0.0, 0.0
     for i in range(count):
-        value += weight[i] * s.d[i]
+        value += weight[i] * s.work.d[i]
         for j in range(count):
-            variance += weight[i] * weight[j] * s.H[0, i, j]
+            variance += weight[i] * weight[j] * s.work.H[0, i, j]
     return value / scale, math.sqrt(max(variance, 0.0)) / scale
 
 
 @jit
-def evaluate(s: Any, c: Any, m: int, eps: float, b_r: float, b_p: float) -> float:
+def evaluate(s: State, c: SignatureSettings, m: int, eps: float, b_r: float, b_p: float) -> float:
     """
     Weigh the hypotheses on one set.
 
@@ -220,10 +222,10 @@ def evaluate(s: Any, c: Any, m: int, eps: float, b_r: float, b_p: float) -> floa
         logp[SPRING] = J_0
     for h in range(PRELOAD, N_HYP):
         k = COLUMN[h]
-        info = s.Gm[0, k, k] + 1.0 / (c.change_std[h] * c.change_std[h])
-        value[h] = s.gv[k] / info
+        info = s.work.Gm[0, k, k] + 1.0 / (c.change_std[h] * c.change_std[h])
+        value[h] = s.work.gv[k] / info
         std[h] = 1.0 / math.sqrt(info)
-        logp[h] = J_0 - s.gv[k] * value[h]
+        logp[h] = J_0 - s.work.gv[k] * value[h]
     J_min = logp[0]
     for h in range(1, N_HYP):
         J_min = min(J_min, logp[h])
@@ -252,31 +254,71 @@ def evaluate(s: Any, c: Any, m: int, eps: float, b_r: float, b_p: float) -> floa
 
 
 @jit
-def joint_change(s: Any, c: Any, m: int) -> bool:
+def clear_set(s: State, m: int) -> None:
     """
-    Estimate spring, preload and friction together, for the trends.
+    Empty one set, sums and evidence.
 
-    :param s: state record; now and now_std are written: dK/K0, preload in N, dF.
+    :param s: state record.
+    :param m: index of the set.
+    """
+    clear_sums(s, m)
+    s.D[m] = 0.0
+    s.due[m] = 0
+    s.over[m] = 0
+
+
+@jit
+def restart_sets(s: State) -> None:
+    """
+    Empty the sets of the watch.
+
+    :param s: state record.
+    """
+    for m in range(SET_ALARM):
+        clear_set(s, m)
+        s.d_max[m] = 0.0
+
+
+@jit
+def look(s: State, c: SignatureSettings, m: int) -> bool:
+    """
+    Look for a change on one memory, before any alarm.
+
+    A set is evaluated as often as its memory can change, and at every block once D is not
+    small. Where the whole misfit is below a limit, D is below it too and need not be computed.
+
+    :param s: state record.
     :param c: settings record.
     :param m: index of the set.
-    :return: False if the set is not usable yet.
+    :return: True where the set was evaluated.
     """
-    ne = s.ne[m]
-    if ne < 60.0:
+    s.due[m] += 1
+    if s.rr[m] < D_VERIFY * s.sigma * s.sigma:
+        s.D[m] = 0.0
+        s.over[m] = 0
         return False
-    iv = 1.0 / (s.sigma * s.sigma)
-    if eliminate_reference(s, m, iv) < 0.0:
+    if s.D[m] < 0.5 * c.d_alarm and s.due[m] < c.memory[m] / 10.0:
         return False
-    prior = (c.change_std[2], c.change_std[3], c.change_std[1], c.change_std[0])
-    if solve_group(s, m, iv, JOINT_COLUMNS, len(s.d), prior) < 0.0:
+    s.due[m] = 0
+    D = evaluate(s, c, m, c.model_error, 0.0, 0.0)
+    s.d_max[m] = max(s.d_max[m], D)
+    s.over[m] = s.over[m] + 1 if c.d_alarm < D else 0
+    return True
+
+
+@jit
+def due(s: Evidence, m: int, stride: int, enough: bool) -> bool:
+    """
+    Tell whether it is a set's turn to be evaluated.
+
+    :param s: state record; the block is counted.
+    :param m: index of the set.
+    :param stride: blocks between two turns.
+    :param enough: whether it holds enough to be evaluated.
+    :return: True if so.
+    """
+    s.due[m] += 1
+    if s.due[m] < stride or not enough:
         return False
-    H, d = s.H[0], s.d
-    v = s.vb[m] / ne
-    scale = max(s.theta[SIGN] + s.theta[V] * v, SMALL_FRICTION)
-    s.now[0] = d[0] / s.theta[X1]
-    s.now[1] = d[1] * (c.force_scale if c.diaphragm_area > 0.0 else -c.force_scale)
-    s.now[2] = (d[2] + d[3] * v) / scale
-    s.now_std[0] = math.sqrt(H[0, 0]) / s.theta[X1]
-    s.now_std[1] = math.sqrt(H[1, 1]) * c.force_scale
-    s.now_std[2] = math.sqrt(H[2, 2] + 2.0 * v * H[2, 3] + v * v * H[3, 3]) / scale
+    s.due[m] = 0
     return True

@@ -1,66 +1,93 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Begin and end of an alarm as the signature sees it."""
+"""The alarm as the signature sees it: its own, its begin and end, what it means."""
 
-from typing import Any
+import math
 
 from damadics_fd.core.jit import jit
-from damadics_fd.core.signature.air import restart_air, supply_change
+from damadics_fd.core.signature.air import restart_air, supply_change, supply_lost
+from damadics_fd.core.signature.cause import (
+    FULL_EVIDENCE,
+    STAGE2_EVIDENCE,
+    begin_judgement,
+    end_judgement,
+    name_supply,
+)
+from damadics_fd.core.signature.cues import forget_stick, restart_cues
+from damadics_fd.core.signature.evidence import clear_set, look, restart_sets
+from damadics_fd.core.signature.phase import enter
+from damadics_fd.core.signature.settings import SignatureSettings
+from damadics_fd.core.signature.size import joint_change
 from damadics_fd.core.signature.state import (
-    CAUSE_NONE,
+    CAUSE_FRICTION_DOWN,
+    CAUSE_FRICTION_UP,
+    CAUSE_SPRING_SOFTER,
+    CAUSE_SPRING_STIFFER,
     CAUSE_SUPPLY,
     CAUSE_UNDETERMINED,
-    FAMILY_SUPPLY,
+    FAMILY_UNCONFIRMED,
     FAMILY_UNDETERMINED,
     SET_ALARM,
+    SET_SLOW,
     SET_UNIT,
     STATE_ALARM,
     STATE_MONITOR,
     STATE_VERIFY,
+    OwnAlarm,
+    State,
 )
-from damadics_fd.core.signature.sums import clear_set
 
-P_SUPPLY = 0.95
+HYSTERESIS = 0.9  # of a material change
 
 
 @jit
-def forget_cause(s: Any) -> None:
+def watch(s: State, c: SignatureSettings) -> None:
     """
-    Set value, deviation and confidence to 0: unknown.
+    Look for a change on the three memories before any alarm.
+
+    :param s: state record; own is set if the own alarm is due.
+    :param c: settings record.
+    """
+    for m in range(SET_SLOW + 1):
+        if not look(s, c, m):
+            continue
+        if m == SET_SLOW:
+            joint_change(s, c, m)
+        if s.over[m] >= c.n_alarm and s.state == STATE_MONITOR and own_alarm_ready(s, c):
+            s.own = 1
+            s.own_t = s.t
+
+
+@jit
+def own_alarm_ready(s: State, c: SignatureSettings) -> bool:
+    """
+    Tell whether the force model is good enough for an own alarm.
 
     :param s: state record.
+    :param c: settings record.
+    :return: False where VERIFY found a poor plug force model or the user switched it off.
     """
-    s.cause_value = 0.0
-    s.cause_std = 0.0
-    s.confidence = 0.0
+    allowed: bool = c.own_alarm != 0 and s.verified != 0 and s.kappa <= c.kappa_max
+    return allowed
 
 
 @jit
-def start_alarm(s: Any) -> None:
+def start_alarm(s: State) -> None:
     """
     Begin to collect evidence on an alarm.
 
     :param s: state record.
     """
-    s.state = STATE_ALARM
-    s.since = s.t
+    enter(s, STATE_ALARM, s.t)
     s.alarm_t = s.t
-    s.b_p_until = s.t
     s.n_alarm = 0.0
-    s.stage2 = 0
-    s.run_f = 0
-    s.run_e = 0
-    s.family = FAMILY_UNDETERMINED
-    s.cause = CAUSE_UNDETERMINED
-    s.second = 0
-    forget_cause(s)
-    s.r_max = 0.0
-    s.stick = 0
+    begin_judgement(s)
+    restart_cues(s, s.t)
     clear_set(s, SET_ALARM)
 
 
 @jit
-def start_supply_alarm(s: Any, c: Any) -> None:
+def start_supply_alarm(s: State, c: SignatureSettings) -> None:
     """
     Raise the own alarm on a loss of supply pressure.
 
@@ -70,14 +97,11 @@ def start_supply_alarm(s: Any, c: Any) -> None:
     start_alarm(s)
     s.own = 1
     s.own_t = s.t
-    s.family = FAMILY_SUPPLY
-    s.cause = CAUSE_SUPPLY
-    s.cause_value = supply_change(s, c)
-    s.confidence = P_SUPPLY
+    name_supply(s, supply_change(s, c))
 
 
 @jit
-def end_alarm(s: Any) -> None:
+def end_alarm(s: State) -> None:
     """
     Go back to monitoring (or verifying) with empty sums.
 
@@ -85,28 +109,92 @@ def end_alarm(s: Any) -> None:
     """
     s.own = 0
     s.own_t = 0
-    s.stage2 = 0
-    s.family = FAMILY_UNDETERMINED
-    s.cause = CAUSE_NONE
-    forget_cause(s)
-    s.r_max = 0.0
-    s.stick = 0
+    end_judgement(s)
+    forget_stick(s)
     clear_set(s, SET_ALARM)
     clear_set(s, SET_UNIT)  # after a repair it may be another valve
     restart_sets(s)
     restart_air(s)
-    s.state = STATE_MONITOR if s.verified else STATE_VERIFY
-    s.since = s.t
+    enter(s, STATE_MONITOR if s.verified else STATE_VERIFY, s.t)
 
 
 @jit
-def restart_sets(s: Any) -> None:
+def count_block(s: State) -> None:
     """
-    Empty the accumulators of the watch.
+    Count a moving block of the alarm.
 
     :param s: state record.
     """
-    for m in range(SET_ALARM):
-        clear_set(s, m)
-        s.d_max[m] = 0.0
-    s.n_moving = 0
+    s.n_alarm += s.block.w
+
+
+@jit
+def shift_alarm(s: OwnAlarm, shift: int) -> None:
+    """
+    Follow a clock that was set back.
+
+    :param s: state record.
+    :param shift: [ns] new time minus old time.
+    """
+    s.alarm_t += shift
+    s.own_t += shift
+
+
+@jit
+def own_level(s: State, c: SignatureSettings) -> int:
+    """
+    Tell the detector whether the own alarm's condition is present.
+
+    :param s: state record.
+    :param c: settings record.
+    :return: 1 while it is, else 0.
+    """
+    if s.own == 0:
+        return 0
+    if s.cause == CAUSE_SUPPLY:
+        return 1 if supply_lost(s, c) else 0
+    if s.ne[SET_ALARM] < FULL_EVIDENCE or s.stage2 == 0 or s.ne[SET_SLOW] < STAGE2_EVIDENCE:
+        return 1
+    # a slow change may hover about the limit on the short record, and is plain on the long one
+    return 1 if max(s.D[SET_ALARM], s.D[SET_SLOW]) > c.d_decide else 0
+
+
+@jit
+def persists(s: State, c: SignatureSettings) -> bool:
+    """
+    Tell whether a named change is still there, as the evidence since the alarm says.
+
+    :param s: state record.
+    :param c: settings record.
+    :return: True while neither alarm may end.
+    """
+    if s.state != STATE_ALARM or s.family in (FAMILY_UNDETERMINED, FAMILY_UNCONFIRMED):
+        return False
+    if s.cause == CAUSE_SUPPLY:
+        return supply_lost(s, c)
+    present: bool = max(s.D[SET_ALARM], s.D[SET_SLOW]) > c.d_decide
+    return present
+
+
+@jit
+def material(s: State, c: SignatureSettings, before: bool) -> bool:
+    """
+    Tell whether the present change matters for maintenance.
+
+    :param s: state record.
+    :param c: settings record.
+    :param before: whether it mattered before; a change about the limit does not chatter.
+    :return: False for a named friction or spring change that is certainly small, and of the own
+        alarm until the size is known.
+    """
+    if s.cause == CAUSE_UNDETERMINED and s.own != 0:
+        return bool((s.t - s.alarm_t) * 1e-9 >= c.unconfirmed_after)
+    if math.isnan(s.cause_value):
+        return True
+    share = HYSTERESIS if before else 1.0
+    most = abs(s.cause_value) + 2.0 * s.cause_std
+    if s.cause in (CAUSE_FRICTION_UP, CAUSE_FRICTION_DOWN):
+        return bool(most >= share * c.material_friction)
+    if s.cause in (CAUSE_SPRING_STIFFER, CAUSE_SPRING_SOFTER):
+        return bool(most >= share * c.material_spring)
+    return True

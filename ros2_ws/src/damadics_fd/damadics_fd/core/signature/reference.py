@@ -11,11 +11,15 @@ which P1 - P2 is measured too late, as 3 ms of a pulsating pressure are 1 N.
 """
 
 import math
-from typing import Any
 
 from damadics_fd.core.jit import jit
 from damadics_fd.core.linalg import inverse
+from damadics_fd.core.record import Floats
 from damadics_fd.core.signature.air import forget_air
+from damadics_fd.core.signature.cues import forget_stick
+from damadics_fd.core.signature.evidence import clear_set
+from damadics_fd.core.signature.phase import enter
+from damadics_fd.core.signature.settings import SignatureSettings
 from damadics_fd.core.signature.state import (
     LAG,
     N_REF,
@@ -27,8 +31,9 @@ from damadics_fd.core.signature.state import (
     STATE_LEARN,
     STRIBECK,
     TABLE,
+    State,
 )
-from damadics_fd.core.signature.sums import accumulate, clear_set
+from damadics_fd.core.signature.sums import accumulate
 
 INFLATION = 2.0  # model error of the reference, as a factor on its variance
 STICK_FLOOR = 0.005  # [1] lowest stick range to compare with
@@ -36,14 +41,14 @@ GROWTH = 1.25  # of the record between two fits of the unit: a fault's first blo
 
 
 @jit
-def start_learning(s: Any, c: Any) -> None:
+def start_learning(s: State, c: SignatureSettings) -> None:
     """
     Forget the reference and learn it anew.
 
     :param s: state record.
     :param c: settings record.
     """
-    s.state = STATE_LEARN
+    enter(s, STATE_LEARN, s.t)
     s.verified = 0
     s.kappa = 1.0
     s.sigma = c.sigma_min
@@ -59,29 +64,28 @@ def start_learning(s: Any, c: Any) -> None:
     s.n_down = 0
     s.x_low = 1.0
     s.x_high = 0.0
-    s.r_max = 0.0
-    s.stick = 0
+    forget_stick(s)
     forget_air(s)
 
 
 @jit
-def learn_block(s: Any) -> None:
+def learn_block(s: State) -> None:
     """
     Add a moving block to the sums of the reference.
 
     :param s: state record.
     """
-    accumulate(s, SET_ALARM, 1.0, s.u)
-    if s.v > 0.0:
+    accumulate(s, SET_ALARM, 1.0, s.block.u)
+    if s.block.v > 0.0:
         s.n_up += 1
     else:
         s.n_down += 1
-    s.x_low = min(s.x_low, s.x)
-    s.x_high = max(s.x_high, s.x)
+    s.x_low = min(s.x_low, s.block.x)
+    s.x_high = max(s.x_high, s.block.x)
 
 
 @jit
-def learning_progress(s: Any, c: Any) -> float:
+def learning_progress(s: State, c: SignatureSettings) -> float:
     """
     Return the share of the learning that is done, by its slowest condition.
 
@@ -98,7 +102,7 @@ def learning_progress(s: Any, c: Any) -> float:
 
 
 @jit
-def finish_learning(s: Any, c: Any) -> bool:
+def finish_learning(s: State, c: SignatureSettings) -> bool:
     """
     Compute the reference if the valve has moved enough.
 
@@ -107,8 +111,8 @@ def finish_learning(s: Any, c: Any) -> bool:
     :return: True if learning is over.
     """
     if learning_progress(s, c) < 1.0:
-        if (s.t - s.t0) * 1e-9 >= 2.0 * c.learn:
-            s.state = STATE_INSUFFICIENT
+        if s.state == STATE_LEARN and (s.t - s.t0) * 1e-9 >= 2.0 * c.learn:
+            enter(s, STATE_INSUFFICIENT, s.t)
         return False
     if not solve_reference(s, c):
         return False
@@ -117,7 +121,7 @@ def finish_learning(s: Any, c: Any) -> bool:
 
 
 @jit
-def fit_sums(s: Any, c: Any, m: int, theta: Any) -> float:
+def fit_sums(s: State, c: SignatureSettings, m: int, theta: Floats) -> float:
     """
     Fit the fault-free model to the sums of one set.
 
@@ -128,7 +132,7 @@ def fit_sums(s: Any, c: Any, m: int, theta: Any) -> float:
     :return: sigma, noise of a block; negative where the sums are not usable.
     """
     S, q = s.S[m], s.q[m]
-    H, work, prior = s.Gm[0], s.L[0], s.Y[0]
+    H, work, prior = s.work.Gm[0], s.work.L[0], s.work.Y[0]
     n = len(theta)
     prior_precision(prior, c, work, n)
     for i in range(n):
@@ -154,7 +158,7 @@ def fit_sums(s: Any, c: Any, m: int, theta: Any) -> float:
 
 
 @jit
-def solve_reference(s: Any, c: Any) -> bool:
+def solve_reference(s: State, c: SignatureSettings) -> bool:
     """
     Compute the reference from the sums over the fault-free valve.
 
@@ -168,13 +172,13 @@ def solve_reference(s: Any, c: Any) -> bool:
     s.sigma = sigma
     s.n_learn = s.ne[SET_ALARM]
     take_unit(s, s.theta, sigma, s.n_learn)
-    H, n = s.Gm[0], len(s.theta)
+    H, n = s.work.Gm[0], len(s.theta)
     for i in range(n):
         for j in range(n):
             H[i, j] *= INFLATION * sigma * sigma
         floor = c.floor[i] if i < TABLE else c.plug_floor
         H[i, i] += floor * floor
-    if not inverse(H, s.L[0], n):
+    if not inverse(H, s.work.L[0], n):
         return False
     for i in range(n):
         for j in range(n):
@@ -183,7 +187,7 @@ def solve_reference(s: Any, c: Any) -> bool:
 
 
 @jit
-def take_unit(s: Any, theta: Any, sigma: float, weight: float) -> None:
+def take_unit(s: State, theta: Floats, sigma: float, weight: float) -> None:
     """
     State sizes from now on in units of the valve just fitted.
 
@@ -196,12 +200,12 @@ def take_unit(s: Any, theta: Any, sigma: float, weight: float) -> None:
     for i in range(TABLE):
         s.unit[i] = theta[i]
         for j in range(TABLE):
-            s.unit_cov[i, j] = variance * s.Gm[0, i, j]
+            s.unit_cov[i, j] = variance * s.work.Gm[0, i, j]
     s.unit_weight = weight
 
 
 @jit
-def refine_unit(s: Any, c: Any) -> None:
+def refine_unit(s: State, c: SignatureSettings) -> None:
     """
     Add a fault-free block to what sizes are stated in; fit anew when its record has grown.
 
@@ -213,15 +217,15 @@ def refine_unit(s: Any, c: Any) -> None:
     """
     if s.unit_weight >= c.size_weight:
         return
-    accumulate(s, SET_UNIT, 1.0, s.u)
+    accumulate(s, SET_UNIT, 1.0, s.block.u)
     if s.ne[SET_UNIT] >= GROWTH * s.unit_weight:
-        sigma = fit_sums(s, c, SET_UNIT, s.y0)
+        sigma = fit_sums(s, c, SET_UNIT, s.work.y0)
         if sigma > 0.0:
-            take_unit(s, s.y0, sigma, s.ne[SET_UNIT])
+            take_unit(s, s.work.y0, sigma, s.ne[SET_UNIT])
 
 
 @jit
-def prior_precision(Pi: Any, c: Any, work: Any, n: int) -> None:
+def prior_precision(Pi: Floats, c: SignatureSettings, work: Floats, n: int) -> None:
     """
     Fill the prior information on the reference, scaled to the smallest block noise.
 
@@ -248,13 +252,14 @@ def prior_precision(Pi: Any, c: Any, work: Any, n: int) -> None:
 
 
 @jit
-def widen_reference(s: Any, kappa: float) -> None:
+def widen_reference(s: State, kappa: float) -> None:
     """
-    Take the misfit seen in VERIFY into the noise and the error of the reference.
+    Verify the reference: take the misfit seen into its noise and its error.
 
     :param s: state record.
     :param kappa: factor on the standard deviations, at least 1.
     """
+    s.verified = 1
     s.kappa = kappa
     s.sigma *= kappa
     for i in range(N_REF):

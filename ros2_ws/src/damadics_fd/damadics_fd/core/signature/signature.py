@@ -5,49 +5,26 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from damadics_fd.core.jit import jit
-from damadics_fd.core.signature.own_alarm import end_alarm
+from damadics_fd.core.record import Plain, Saved
 from damadics_fd.core.signature.reference import learning_progress
+from damadics_fd.core.signature.settings import MIN_RATE, SignatureSettings
 from damadics_fd.core.signature.state import (
     CAUSE_ELASTIC,
     CAUSES,
-    MIN_RATE,
-    REFERENCE_DTYPE,
-    STATE_ALARM,
-    STATE_DTYPE,
+    SAVED,
     STATE_INSUFFICIENT,
     STATE_MONITOR,
     STATE_VERIFY,
     X1,
-    SignatureSettings,
+    State,
     known,
-    settings_record,
 )
-from damadics_fd.core.signature.step import step
 
 UNKNOWN = ('air_rate', 'now', 'now_std')
-LATER = {'air_ref_ps': [0.0, 0.0]}  # what references of version 0.1 do not have
-
-
-@jit
-def _update(
-    s: Any, c: Any, t: int, x: float, ps: float, dp: float, ready: bool, alarm: bool
-) -> int:
-    """Call `step` with the records of arrays of length 1."""
-    return step(s[0], c[0], t, x, ps, dp, ready, alarm)
-
-
-@jit
-def _clear(state: Any) -> None:
-    """Clear the latched alarm of an array of length 1."""
-    s = state[0]
-    if s.state == STATE_ALARM:
-        s.alarm_in = 0
-        end_alarm(s)
+LATER: Saved = {'air_ref_ps': [0.0, 0.0]}  # what references of version 0.1 do not have
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,38 +41,17 @@ class SignatureView:
 
 
 class Signature:
-    """The valve signature of one actuator, sample by sample."""
+    """The valve signature of one actuator."""
 
     def __init__(self, settings: SignatureSettings) -> None:
         self.settings = settings
-        self.record = settings_record(settings)
-        self.state = np.zeros(1, STATE_DTYPE)
+        self.record = settings.record()
+        self.state = State.rows()
         self.relearn()
-
-    def update(
-        self, t: int, x: float, ps: float, dp: float, ready: bool = True, alarm: bool = False
-    ) -> int:
-        """
-        Take one accepted sample.
-
-        :param t: [ns] stamp.
-        :param x: [1] raw stem position / stroke.
-        :param ps: [Pa] chamber pressure, gauge; NaN where not measured.
-        :param dp: [Pa] P1 - P2.
-        :param ready: False while the filters settle or the input is interrupted.
-        :param alarm: an alarm is present or latched, whoever raised it.
-        :return: QUIET, BLOCK or CHANGED.
-        """
-        result: int = _update(self.state, self.record, t, x, ps, dp, ready, alarm)
-        return result
-
-    def clear(self) -> None:
-        """Clear the latched alarm; what follows is judged afresh."""
-        _clear(self.state)
 
     def relearn(self) -> None:
         """Forget the reference and learn it anew from the next sample on."""
-        self.state[:] = np.zeros(1, STATE_DTYPE)
+        self.state[:] = State.rows()
         for name in UNKNOWN:
             self.state[name] = math.nan
 
@@ -124,7 +80,7 @@ class Signature:
             f'{self.settings.learn_range:g} of its range, both ways'
         )
 
-    def save(self) -> dict[str, Any]:
+    def save(self) -> Saved:
         """
         Return the reference, to be kept over a restart.
 
@@ -132,30 +88,16 @@ class Signature:
         """
         if self.state['state'][0] < STATE_VERIFY:
             return {}
-        return {name: self.state[name][0].tolist() for name in REFERENCE_DTYPE.names or ()}
+        return State.plain(self.state, SAVED)
 
-    def load(self, saved: Mapping[str, Any]) -> None:
+    def load(self, saved: Mapping[str, Plain]) -> None:
         """
         Start from a saved reference instead of learning.
 
         :param saved: as returned by `save`.
         :raises ValueError: where it is no such reference; the present state is then untouched.
         """
-        saved = {**LATER, **saved}
-        wrong = sorted(set(saved) ^ set(REFERENCE_DTYPE.names or ()))
-        if wrong:
-            raise ValueError(f'signature reference: {", ".join(wrong)} missing or unknown')
-        state = np.zeros(1, STATE_DTYPE)
-        for name, value in saved.items():
-            try:
-                given = np.asarray(value, state[name].dtype)
-            except (TypeError, ValueError, OverflowError) as error:
-                raise ValueError(f'signature reference: {name} does not fit: {error}') from error
-            if given.shape != state[name].shape[1:]:
-                raise ValueError(f'signature reference: {name} has the shape {given.shape}')
-            state[name][0] = given
-            if not np.isfinite(state[name]).all():
-                raise ValueError(f'signature reference: {name} is not finite')
+        state = State.read({**LATER, **saved}, 'signature reference', SAVED)
         if not (
             state['sigma'][0] > 0.0
             and state['r_ref'][0] > 0.0

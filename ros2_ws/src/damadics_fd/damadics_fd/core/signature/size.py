@@ -3,25 +3,32 @@
 """Sizes as a person reads them: shares of the valve as well as it is known, N, Pa."""
 
 import math
-from typing import Any
+
+import numpy as np
 
 from damadics_fd.core.jit import jit
+from damadics_fd.core.signature.evidence import eliminate_reference, solve_group
+from damadics_fd.core.signature.settings import SignatureSettings
 from damadics_fd.core.signature.state import (
     DP_OFFSET,
     FRICTION,
+    ONE,
     POSITION_GAIN,
     PRELOAD,
     PRESSURE_GAIN,
     SET_SLOW,
     SIGN,
+    SMALL_FRICTION,
     SPRING,
     X1,
+    State,
     V,
 )
 
 UNKNOWN = 0.2  # relative deviation of the unit from which no size is stated
 APART = 4.0  # deviations by which dry and viscous friction must have changed differently
-SMALL_FRICTION = 1e-3  # [1] least friction that a share is taken of
+JOINT_COLUMNS = np.array([X1, ONE, SIGN, V])
+JOINT_EVIDENCE = 60.0  # blocks
 
 
 @jit
@@ -41,7 +48,7 @@ def in_units(value: float, std: float, ratio: float, variance: float) -> tuple[f
 
 
 @jit
-def physical_value(s: Any, c: Any, m: int, h: int) -> tuple[float, float]:
+def physical_value(s: State, c: SignatureSettings, m: int, h: int) -> tuple[float, float]:
     """
     Convert a change to what a person reads.
 
@@ -86,3 +93,35 @@ def physical_value(s: Any, c: Any, m: int, h: int) -> tuple[float, float]:
     if h == DP_OFFSET:
         return -1e6 * value, 1e6 * std
     return value, std
+
+
+@jit
+def joint_change(s: State, c: SignatureSettings, m: int) -> bool:
+    """
+    Estimate spring, preload and friction together, for the trends.
+
+    :param s: state record; now, now_std and now_t are written: dK/K0, preload in N, dF.
+    :param c: settings record.
+    :param m: index of the set.
+    :return: False if the set is not usable yet.
+    """
+    ne = s.ne[m]
+    if ne < JOINT_EVIDENCE:
+        return False
+    iv = 1.0 / (s.sigma * s.sigma)
+    if eliminate_reference(s, m, iv) < 0.0:
+        return False
+    prior = (c.change_std[2], c.change_std[3], c.change_std[1], c.change_std[0])
+    if solve_group(s, m, iv, JOINT_COLUMNS, len(s.work.d), prior) < 0.0:
+        return False
+    H, d = s.work.H[0], s.work.d
+    v = s.vb[m] / ne
+    scale = max(s.theta[SIGN] + s.theta[V] * v, SMALL_FRICTION)
+    s.now[0] = d[0] / s.theta[X1]
+    s.now[1] = d[1] * (c.force_scale if c.diaphragm_area > 0.0 else -c.force_scale)
+    s.now[2] = (d[2] + d[3] * v) / scale
+    s.now_std[0] = math.sqrt(H[0, 0]) / s.theta[X1]
+    s.now_std[1] = math.sqrt(H[1, 1]) * c.force_scale
+    s.now_std[2] = math.sqrt(H[2, 2] + 2.0 * v * H[2, 3] + v * v * H[3, 3]) / scale
+    s.now_t = s.t
+    return True

@@ -3,26 +3,36 @@
 """The step of the valve signature: from a sample to blocks, reference, evidence and cause."""
 
 import math
-from typing import Any
 
 from damadics_fd.core.jit import jit, layer
 from damadics_fd.core.signature.air import strokes_agree, supply_lost, track_air
-from damadics_fd.core.signature.blocks import add_sample, close_block, judge_block, open_block
-from damadics_fd.core.signature.cause import (
-    D_VERIFY,
-    FULL_EVIDENCE,
-    STAGE2_EVIDENCE,
-    STAGE2_STRONG,
-    decide,
-    watch,
+from damadics_fd.core.signature.blocks import (
+    add_sample,
+    break_run,
+    close_block,
+    interrupt,
+    judge_block,
+    let_grow,
+    open_block,
 )
-from damadics_fd.core.signature.cues import check_passivity, stick_evidence, track_stick
+from damadics_fd.core.signature.cause import STAGE2_STRONG, decide
+from damadics_fd.core.signature.cues import (
+    check_passivity,
+    restart_range,
+    shift_cues,
+    stick_evidence,
+    track_stick,
+)
+from damadics_fd.core.signature.evidence import D_VERIFY, clear_set, restart_sets
 from damadics_fd.core.signature.own_alarm import (
+    count_block,
     end_alarm,
-    restart_sets,
+    shift_alarm,
     start_alarm,
     start_supply_alarm,
+    watch,
 )
+from damadics_fd.core.signature.phase import count_moving, enter, shift_phase
 from damadics_fd.core.signature.reference import (
     finish_learning,
     learn_block,
@@ -31,62 +41,58 @@ from damadics_fd.core.signature.reference import (
     start_learning,
     widen_reference,
 )
+from damadics_fd.core.signature.settings import SignatureSettings
 from damadics_fd.core.signature.state import (
-    CAUSE_FRICTION_DOWN,
-    CAUSE_FRICTION_UP,
-    CAUSE_SPRING_SOFTER,
-    CAUSE_SPRING_STIFFER,
-    CAUSE_SUPPLY,
-    CAUSE_UNDETERMINED,
-    FAMILY_UNCONFIRMED,
-    FAMILY_UNDETERMINED,
     SET_ALARM,
     SET_SLOW,
     SET_UNIT,
-    SIGN,
-    SIGN_T,
     STATE_ALARM,
     STATE_INSUFFICIENT,
     STATE_LEARN,
     STATE_MONITOR,
     STATE_UNAVAILABLE,
     STATE_VERIFY,
-    X1,
-    X1_T,
+    State,
 )
-from damadics_fd.core.signature.sums import (
-    accumulate,
-    clear_set,
-    copy_set,
-    growth_time,
-    residual,
-)
+from damadics_fd.core.signature.sums import accumulate, copy_sums, growth_time, residual
 
-HYSTERESIS = 0.9  # of a material change
 BREAK_AWAY = 2  # blocks of a stroke in which strong friction is still more than when sliding
 QUIET, BLOCK, CHANGED = 0, 1, 2  # what a step returns: nothing new, a block, a new judgement
 
 
 @jit
-def step(s: Any, c: Any, t: int, x: float, ps: float, dp: float, ready: bool, alarm: bool) -> int:
+def step(
+    s: State,
+    c: SignatureSettings,
+    t: int,
+    x: float,
+    ps: float,
+    dp: float,
+    ready: bool,
+    alarm: bool,
+) -> int:
     """
-    Take one accepted sample; its arguments are those of `Signature.update`.
+    Take one accepted sample.
 
     :param s: state record.
     :param c: settings record.
+    :param t: [ns] stamp.
+    :param x: [1] raw stem position / stroke.
+    :param ps: [Pa] chamber pressure, gauge; NaN where not measured.
+    :param dp: [Pa] P1 - P2.
+    :param ready: False while the filters settle or the input is interrupted.
+    :param alarm: an alarm is present or latched, whoever raised it.
     :return: QUIET, BLOCK (a block was judged) or CHANGED (state, family or cause are new).
     """
-    if c.available == 0:
+    if not c.available:
         return QUIET
     if not (ready and math.isfinite(x) and math.isfinite(ps) and math.isfinite(dp)):
-        s.run = 0
-        s.n = 0
-        s.index = -1
+        interrupt(s)
         return QUIET
     if s.state == STATE_UNAVAILABLE:
         s.t0 = t
         s.t = t
-        s.index = -1
+        interrupt(s)
         start_learning(s, c)
     if t <= s.t and s.index >= 0:
         return QUIET  # nothing older than the newest sample is used
@@ -103,14 +109,14 @@ def step(s: Any, c: Any, t: int, x: float, ps: float, dp: float, ready: bool, al
         if s.index >= 0 and close_block(s, c):
             result = max(result, judge(s, c))
         if gap > c.block_ns:
-            s.run = 0
+            break_run(s)
         open_block(s, index)
     add_sample(s, c, (t - s.t0) * 1e-9, x, ps, dp)
     return result
 
 
 @jit
-def take_alarm(s: Any, c: Any) -> int:
+def take_alarm(s: State, c: SignatureSettings) -> int:
     """
     Follow an edge of the alarm.
 
@@ -121,9 +127,7 @@ def take_alarm(s: Any, c: Any) -> int:
     learning = s.state == STATE_LEARN or s.state == STATE_INSUFFICIENT
     if learning:
         s.t0 = s.t
-        s.index = -1
-        s.n = 0
-        s.run = 0
+        interrupt(s)
         start_learning(s, c)  # what has been seen may be the fault
     elif s.alarm_in != 0 and s.state != STATE_ALARM:
         start_alarm(s)
@@ -133,7 +137,7 @@ def take_alarm(s: Any, c: Any) -> int:
 
 
 @jit
-def shift_clock(s: Any, shift: int) -> None:
+def shift_clock(s: State, shift: int) -> None:
     """
     Go on after an interruption in which the clock was set back.
 
@@ -142,74 +146,13 @@ def shift_clock(s: Any, shift: int) -> None:
     """
     s.t += shift
     s.t0 += shift
-    s.since += shift
-    s.alarm_t += shift
-    s.own_t += shift
-    s.b_p_until += shift
-
-
-@jit
-def own_level(s: Any, c: Any) -> int:
-    """
-    Tell the detector whether the own alarm's condition is present.
-
-    :param s: state record.
-    :param c: settings record.
-    :return: 1 while it is, else 0.
-    """
-    if s.own == 0:
-        return 0
-    if s.cause == CAUSE_SUPPLY:
-        return 1 if supply_lost(s, c) else 0
-    if s.ne[SET_ALARM] < FULL_EVIDENCE or s.stage2 == 0 or s.ne[SET_SLOW] < STAGE2_EVIDENCE:
-        return 1
-    # a slow change may hover about the limit on the short record, and is plain on the long one
-    return 1 if max(s.D[SET_ALARM], s.D[SET_SLOW]) > c.d_decide else 0
-
-
-@jit
-def persists(s: Any, c: Any) -> bool:
-    """
-    Tell whether a named change is still there, as the evidence since the alarm says.
-
-    :param s: state record.
-    :param c: settings record.
-    :return: True while neither alarm may end.
-    """
-    if s.state != STATE_ALARM or s.family in (FAMILY_UNDETERMINED, FAMILY_UNCONFIRMED):
-        return False
-    if s.cause == CAUSE_SUPPLY:
-        return supply_lost(s, c)
-    present: bool = max(s.D[SET_ALARM], s.D[SET_SLOW]) > c.d_decide
-    return present
-
-
-@jit
-def material(s: Any, c: Any, before: bool) -> bool:
-    """
-    Tell whether the present change matters for maintenance.
-
-    :param s: state record.
-    :param c: settings record.
-    :param before: whether it mattered before; a change about the limit does not chatter.
-    :return: False for a named friction or spring change that is certainly small, and of the own
-        alarm until the size is known.
-    """
-    if s.cause == CAUSE_UNDETERMINED and s.own != 0:
-        return bool((s.t - s.alarm_t) * 1e-9 >= c.unconfirmed_after)
-    if math.isnan(s.cause_value):
-        return True
-    share = HYSTERESIS if before else 1.0
-    most = abs(s.cause_value) + 2.0 * s.cause_std
-    if s.cause in (CAUSE_FRICTION_UP, CAUSE_FRICTION_DOWN):
-        return bool(most >= share * c.material_friction)
-    if s.cause in (CAUSE_SPRING_STIFFER, CAUSE_SPRING_SOFTER):
-        return bool(most >= share * c.material_spring)
-    return True
+    shift_phase(s, shift)
+    shift_alarm(s, shift)
+    shift_cues(s, shift)
 
 
 @layer
-def judge(s: Any, c: Any) -> int:
+def judge(s: State, c: SignatureSettings) -> int:
     """
     Use the middle one of three whole blocks.
 
@@ -225,18 +168,17 @@ def judge(s: Any, c: Any) -> int:
     air = track_air(s, c, s.alarm_in == 0 and s.own == 0)
     if s.state == STATE_LEARN or s.state == STATE_INSUFFICIENT:
         if s.alarm_in == 0 and (s.t - s.t0) * 1e-9 >= c.start:
-            if s.moving != 0:
+            if s.block.moving != 0:
                 learn_block(s)
             if finish_learning(s, c):
-                s.state = STATE_VERIFY
-                s.since = s.t
-                s.r_max = 0.0
+                enter(s, STATE_VERIFY, s.t)
+                restart_range(s)
                 restart_sets(s)
     else:
         if s.state == STATE_ALARM:
             check_passivity(s, c)
-        news = s.state == STATE_ALARM and s.standing != 0 and stick_evidence(s) > 0.0
-        if s.moving != 0 and fresh:
+        news = s.state == STATE_ALARM and s.block.standing != 0 and stick_evidence(s) > 0.0
+        if s.block.moving != 0 and fresh:
             news = monitor_block(s, c)
         if news:
             decide(s, c)
@@ -245,7 +187,7 @@ def judge(s: Any, c: Any) -> int:
         elif (
             air
             and s.state == STATE_MONITOR
-            and c.own_alarm != 0
+            and c.own_alarm
             and supply_lost(s, c)
             and strokes_agree(s)
         ):
@@ -254,7 +196,7 @@ def judge(s: Any, c: Any) -> int:
 
 
 @jit
-def since_alarm(s: Any, c: Any) -> bool:
+def since_alarm(s: State, c: SignatureSettings) -> bool:
     """
     Tell whether the middle block began after the alarm.
 
@@ -267,7 +209,7 @@ def since_alarm(s: Any, c: Any) -> bool:
 
 
 @layer
-def monitor_block(s: Any, c: Any) -> bool:
+def monitor_block(s: State, c: SignatureSettings) -> bool:
     """
     Add a moving block to the sums and, where there is no alarm, look for one.
 
@@ -280,13 +222,11 @@ def monitor_block(s: Any, c: Any) -> bool:
         if m == SET_SLOW and s.stage2 == STAGE2_STRONG and s.slide <= BREAK_AWAY:
             continue
         accumulate(s, m, 1.0 - 1.0 / c.memory[m], r)
-    s.n_moving += 1
+    count_moving(s)
     if s.state == STATE_ALARM:
-        tau = growth_time(s)
-        s.ph[SIGN_T] = s.ph[SIGN] * tau
-        s.ph[X1_T] = s.ph[X1] * tau
+        let_grow(s, growth_time(s))
         accumulate(s, SET_ALARM, 1.0 - 1.0 / c.memory[SET_ALARM], r)
-        s.n_alarm += s.w
+        count_block(s)
         return True
     if s.state == STATE_VERIFY:
         learn_block(s)
@@ -299,7 +239,7 @@ def monitor_block(s: Any, c: Any) -> bool:
 
 
 @jit
-def finish_verification(s: Any, c: Any) -> None:
+def finish_verification(s: State, c: SignatureSettings) -> None:
     """
     Leave VERIFY and widen the reference by the misfit seen.
 
@@ -311,10 +251,8 @@ def finish_verification(s: Any, c: Any) -> None:
     worst = max(s.d_max[0], max(s.d_max[1], s.d_max[2]))
     if s.ne[SET_ALARM] > s.n_learn:
         solve_reference(s, c)  # from LEARN and VERIFY: the size of a change rests on it
-    copy_set(s, SET_UNIT, SET_ALARM)
+    copy_sums(s, SET_UNIT, SET_ALARM)
     clear_set(s, SET_ALARM)
     widen_reference(s, math.sqrt(max(1.0, worst / D_VERIFY)))
     restart_sets(s)
-    s.verified = 1
-    s.state = STATE_MONITOR
-    s.since = s.t
+    enter(s, STATE_MONITOR, s.t)

@@ -2,17 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Exponentially weighted sums over moving blocks, one set for each memory."""
 
-from typing import Any
-
 from damadics_fd.core.jit import jit
-from damadics_fd.core.signature.state import (
-    N_COL,
-    N_REF,
-)
+from damadics_fd.core.signature.state import N_COL, N_REF, State, Sums
 
 
 @jit
-def clear_set(s: Any, m: int) -> None:
+def clear_sums(s: Sums, m: int) -> None:
     """
     Empty one accumulator.
 
@@ -24,13 +19,10 @@ def clear_set(s: Any, m: int) -> None:
     s.rr[m] = 0.0
     s.ne[m] = 0.0
     s.vb[m] = 0.0
-    s.D[m] = 0.0
-    s.due[m] = 0
-    s.over[m] = 0
 
 
 @jit
-def copy_set(s: Any, to: int, m: int) -> None:
+def copy_sums(s: Sums, to: int, m: int) -> None:
     """
     Copy the sums of one accumulator to another.
 
@@ -46,7 +38,7 @@ def copy_set(s: Any, to: int, m: int) -> None:
 
 
 @jit
-def accumulate(s: Any, m: int, forget: float, r: float) -> None:
+def accumulate(s: State, m: int, forget: float, r: float) -> None:
     """
     Add the block under evaluation to one accumulator.
 
@@ -57,8 +49,8 @@ def accumulate(s: Any, m: int, forget: float, r: float) -> None:
     """
     S = s.S[m]
     q = s.q[m]
-    ph = s.ph
-    w = s.w
+    ph = s.block.ph
+    w = s.block.w
     for i in range(N_COL):
         a = w * ph[i]
         for j in range(N_COL):
@@ -66,25 +58,25 @@ def accumulate(s: Any, m: int, forget: float, r: float) -> None:
         q[i] = forget * q[i] + a * r
     s.rr[m] = forget * s.rr[m] + w * r * r
     s.ne[m] = forget * s.ne[m] + w
-    s.vb[m] = forget * s.vb[m] + w * abs(s.v)
+    s.vb[m] = forget * s.vb[m] + w * abs(s.block.v)
 
 
 @jit
-def residual(s: Any) -> float:
+def residual(s: State) -> float:
     """
     Return what the reference does not explain of the force of the block.
 
     :param s: state record.
     :return: r = u - phi' theta0.
     """
-    r: float = s.u
+    r: float = s.block.u
     for i in range(N_REF):
-        r -= s.ph[i] * s.theta[i]
+        r -= s.block.ph[i] * s.theta[i]
     return r
 
 
 @jit
-def growth_time(s: Any) -> float:
+def growth_time(s: State) -> float:
     """
     Return the time that growing changes are counted in.
 

@@ -4,9 +4,9 @@
 
 import numpy as np
 
-from damadics_fd.core.freshness import BACK, default_max_age
 from damadics_fd.core.record import Floats, Ints
 from damadics_fd.core.stamps import DATE, SECOND
+from damadics_fd.ros.freshness import BACK, default_max_age
 
 
 class Ages:

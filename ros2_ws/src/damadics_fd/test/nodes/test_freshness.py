@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from damadics_fd.core.freshness import ForwardJumps, Freshness, default_max_age
+from damadics_fd.ros.freshness import ForwardJumps, Freshness, default_max_age
 
 SECOND = 10**9
 TODAY = 1_790_000_000 * SECOND
