@@ -1,7 +1,7 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
 from collections.abc import Callable, Iterator, Mapping
-from typing import Protocol, TypeVar
+from typing import Generic, Protocol, TypeVar
 
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.client import Client
@@ -9,7 +9,7 @@ from rclpy.clock import Clock
 from rclpy.context import Context
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.impl.rcutils_logger import RcutilsLogger
-from rclpy.parameter import Parameter, Value
+from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from rclpy.service import Service
@@ -29,6 +29,12 @@ class ServiceType(Protocol):
 class NodeHandle:
     @property
     def pointer(self) -> int: ...
+
+class Declared(Generic[M]):
+    """A parameter, of the type of its default."""
+
+    @property
+    def value(self) -> M: ...
 
 class TopicEndpointInfo:
     node_name: str
@@ -67,8 +73,8 @@ class Node:
     def get_logger(self) -> RcutilsLogger: ...
     def get_parameter(self, name: str) -> Parameter: ...
     def declare_parameter(
-        self, name: str, value: Value, descriptor: ParameterDescriptor | None = None
-    ) -> Parameter: ...
+        self, name: str, value: M, descriptor: ParameterDescriptor | None = None
+    ) -> Declared[M]: ...
     def add_post_set_parameters_callback(
         self, callback: Callable[[list[Parameter]], None]
     ) -> None: ...

@@ -5,12 +5,12 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from damadics_fd.bag.columns import read_columns
 from damadics_fd.core.decision.alarm import RAISED
 from damadics_fd.core.monitor import Chain
+from damadics_fd.core.record import Json, Plain
 from damadics_fd.core.result import Result
 from damadics_fd.core.settings import Settings
 
@@ -18,7 +18,7 @@ FAST = ('/measurement', '/fault_state', '/estimate', '/residual', '/threshold')
 ONSET = 70.0  # s, of both faults
 SECONDS = 120.0  # length of each experiment
 PASSES = 2  # of the fault-free experiment that are learned: docs/theory.md says why two
-Learned = Mapping[str, Any]  # what a reference keeps of the estimator
+Learned = Mapping[str, Plain]  # what a reference keeps of the estimator
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class Decisions:
         instants = [t for t in (self.exceeds_at, self.detected_at) if t is not None]
         return any(abs(t - experiment.paper) < 1e-6 for t in instants)
 
-    def as_dict(self, experiment: Experiment) -> dict[str, Any]:
+    def as_dict(self, experiment: Experiment) -> dict[str, Json]:
         """Return the decisions for `results.json`."""
         if experiment.paper is None:
             return {'decisions': self.flags}
@@ -101,7 +101,7 @@ class Outcome:
             and self.lost == 0
         )
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, Json]:
         """Return the outcome for `results.json`."""
         values = self.live.as_dict(self.experiment)
         if self.experiment.paper is not None:
@@ -123,7 +123,7 @@ class Outcome:
 
 def judge(
     experiment: Experiment, bag: Path, learned: Learned
-) -> tuple[Outcome, dict[str, Any], Result]:
+) -> tuple[Outcome, dict[str, np.ndarray], Result]:
     """
     Compare a recorded live run with the paper and with the off-line core.
 
@@ -158,7 +158,7 @@ def judge(
     return outcome, columns, result
 
 
-def off_line(columns: Mapping[str, Any], learned: Learned | None) -> Result:
+def off_line(columns: Mapping[str, np.ndarray], learned: Learned | None) -> Result:
     """
     Put a recording through the core in mode paper.
 
@@ -169,7 +169,7 @@ def off_line(columns: Mapping[str, Any], learned: Learned | None) -> Result:
     return Chain(Settings.for_mode('paper')).starting_from(learned).run(columns)
 
 
-def decisions_of(result: Result, columns: Mapping[str, Any]) -> Decisions:
+def decisions_of(result: Result, columns: Mapping[str, np.ndarray]) -> Decisions:
     """
     Return the decisions of an off-line run.
 
@@ -204,7 +204,7 @@ def exceeds_at(
     return int(stamp[row]) * 1e-9
 
 
-def raised(events: Mapping[str, Any]) -> list[float]:
+def raised(events: Mapping[str, np.ndarray]) -> list[float]:
     """
     Find when a fault was flagged.
 
@@ -219,7 +219,7 @@ def raised(events: Mapping[str, Any]) -> list[float]:
     return [int(stamp) * 1e-9 for stamp in events['stamp'][events['transition'] == RAISED]]
 
 
-def lost_samples(topics: Mapping[str, Mapping[str, Any]]) -> int:
+def lost_samples(topics: Mapping[str, Mapping[str, np.ndarray]]) -> int:
     """
     Count what is missing: samples between the first and the last, on every fast topic.
 
@@ -233,7 +233,7 @@ def lost_samples(topics: Mapping[str, Mapping[str, Any]]) -> int:
     return sum(max(0, expected - len(s)) for s in stamps)
 
 
-def same_as_recorded(result: Result, topics: Mapping[str, Mapping[str, Any]]) -> bool:
+def same_as_recorded(result: Result, topics: Mapping[str, Mapping[str, np.ndarray]]) -> bool:
     """
     Tell whether the off-line core gives what the nodes have published, bit for bit.
 

@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 from functools import cache
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import TypeGuard
 
 import yaml
 
 from damadics_fd.core.decision.events import Event
-from damadics_fd.core.record import Plain
+from damadics_fd.core.record import Plain, Saved
 from damadics_fd.core.signature.state import CAUSES
 from damadics_fd.store.trends import QUANTITIES
 
@@ -178,7 +178,7 @@ def load_causes(path: Path | None = None, language: str = 'en') -> CauseTable:
 
 
 def _parse(
-    content: Any,
+    content: Plain,
     source: str,
     standard: Mapping[str, Cause] | None = None,
 ) -> tuple[dict[str, Cause], dict[str, tuple[float, ...]]]:
@@ -198,16 +198,18 @@ def _parse(
     for name, values in _mapping(content, 'limits', problems).items():
         if name not in QUANTITIES:
             problems.append(f'no such quantity: {name}; known are {", ".join(QUANTITIES)}')
-        elif not isinstance(values, list) or not all(_is_limit(value) for value in values):
+        elif not isinstance(values, list):
             problems.append(f'limits of {name}: expected a list of numbers other than 0')
         else:
-            limits[name] = tuple(float(value) for value in values)
+            limits[name] = tuple(float(value) for value in values if _is_limit(value))
+            if len(limits[name]) < len(values):
+                problems.append(f'limits of {name}: expected a list of numbers other than 0')
     if problems:
         raise CauseTableError(source, problems)
     return causes, limits
 
 
-def _mapping(content: dict[str, Any], key: str, problems: list[str]) -> dict[str, Any]:
+def _mapping(content: Saved, key: str, problems: list[str]) -> Saved:
     value = content.get(key) or {}
     if isinstance(value, dict):
         return value
@@ -215,12 +217,13 @@ def _mapping(content: dict[str, Any], key: str, problems: list[str]) -> dict[str
     return {}
 
 
-def _is_limit(value: Any) -> bool:
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    return number and math.isfinite(value) and value != 0
+def _is_limit(value: Plain) -> TypeGuard[float]:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    return math.isfinite(value) and value != 0
 
 
-def _cause(name: str, entry: dict[str, Any], default: Cause | None, problems: list[str]) -> Cause:
+def _cause(name: str, entry: Saved, default: Cause | None, problems: list[str]) -> Cause:
     texts = {}
     for key in TEXTS:
         texts[key] = entry.get(key, getattr(default, key, ''))
@@ -239,7 +242,7 @@ def _cause(name: str, entry: dict[str, Any], default: Cause | None, problems: li
     return Cause(str(texts['text']), str(texts['advice']), ne107, str(texts['detail']), language)
 
 
-def _template_problem(text: Any) -> str:
+def _template_problem(text: Plain) -> str:
     if not isinstance(text, str):
         return f'{text!r} is not a text'
     try:

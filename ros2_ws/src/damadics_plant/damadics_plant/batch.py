@@ -4,20 +4,33 @@
 
 import os
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from itertools import islice
-from typing import Any
+from typing import Any, TypeVar, overload
 
 from damadics_plant.run import Run
 from damadics_plant.simulator import simulate
 
+Job = Mapping[str, Any]  # arguments of `simulate`
+T = TypeVar('T')
+
+
+@overload
+def simulate_many(jobs: Iterable[Job], *, workers: int | None = None) -> Iterator[Run]: ...
+
+
+@overload
+def simulate_many(
+    jobs: Iterable[Job], reduce: Callable[[Run], T], workers: int | None = None
+) -> Iterator[T]: ...
+
 
 def simulate_many(
-    jobs: Iterable[dict[str, Any]],
-    reduce: Callable[[Run], Any] | None = None,
+    jobs: Iterable[Job],
+    reduce: Callable[[Run], T] | None = None,
     workers: int | None = None,
-) -> Iterator[Any]:
+) -> Iterator[Run | T]:
     """
     Run many scenarios, models or seeds in threads; the compiled loops run side by side.
 
@@ -35,12 +48,12 @@ def simulate_many(
     workers = workers or len(os.sched_getaffinity(0))
     todo = iter(jobs)
 
-    def work(job: dict[str, Any]) -> Any:
+    def work(job: Job) -> Run | T:
         run = simulate(**job)
         return reduce(run) if reduce else run
 
     with ThreadPoolExecutor(workers) as pool:
-        running: deque[Future[Any]] = deque(
+        running: deque[Future[Run | T]] = deque(
             pool.submit(work, job) for job in islice(todo, 2 * workers)
         )
         try:

@@ -11,7 +11,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from tqdm import tqdm
@@ -163,10 +163,10 @@ def _check_space(path: Path, jobs: Sequence[Job]) -> None:
         )
 
 
-_asked: Any = None
+_asked: Stop
 
 
-def _prepare_worker(asked: Any) -> None:
+def _prepare_worker(asked: Stop) -> None:
     global _asked
     _asked = asked
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides, and sets the event

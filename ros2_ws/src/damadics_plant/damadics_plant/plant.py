@@ -5,7 +5,6 @@
 import sys
 import time
 from collections import deque
-from typing import Any
 
 from builtin_interfaces.msg import Time
 from damadics_fd.bag.cdr.layout import stamped_encoder
@@ -140,7 +139,9 @@ class Plant(SpinnableNode):
             self.get_logger().info(f'scenario ended after {self._sent} samples')
             self.finished = True
 
-    def _inject(self, request: Any, response: Any) -> Any:
+    def _inject(
+        self, request: InjectFault.Request, response: InjectFault.Response
+    ) -> InjectFault.Response:
         """Begin a fault with the next sample that is not yet simulated, or clear all."""
         try:
             if request.fault == FaultState.NONE:

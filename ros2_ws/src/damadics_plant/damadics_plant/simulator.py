@@ -6,7 +6,6 @@ import math
 import warnings
 from collections.abc import Callable, Iterator
 from types import ModuleType
-from typing import Any
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from damadics_plant.actuator import dablib, lugre
 from damadics_plant.actuator.measure import OUTPUTS, ROWS
 from damadics_plant.actuator.parameters import Actuator, LuGreActuator
 from damadics_plant.faults.catalogue import CATALOGUE, Fault
-from damadics_plant.faults.effects import EFFECTS_DTYPE, fault_table
+from damadics_plant.faults.effects import Effects, fault_table
 from damadics_plant.run import Columns, Run, stamps
 from damadics_plant.scenarios.disturbance import Disturbance
 from damadics_plant.scenarios.level import LevelLoop
@@ -73,7 +72,7 @@ class Simulator:
         self._tick_rate, self._every = _ticks(self.rate, self.actuator.model)
         self._advance: Callable[..., None] = module.simulate_block
         self._constants = self.actuator.record()
-        self._state: Any = module.initial_state(self.actuator)
+        self._state: np.ndarray = module.initial_state(self.actuator)
         self._strengths = np.zeros(20)
         self._faults = [_admissible(fault, self.actuator) for fault in self.scenario.faults]
         if len(self._faults) > 1:
@@ -184,7 +183,7 @@ class Simulator:
 
     def _lay_out_faults(self) -> None:
         self._table = fault_table(self._faults)
-        self._effects = np.zeros(1, EFFECTS_DTYPE)
+        self._effects = Effects.rows()
 
     def _fill(self, out: np.ndarray) -> None:
         """Fill samples (rows CV and `OUTPUTS`), the loop's period by period."""

@@ -10,7 +10,6 @@ import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from damadics_fd.core.monitor import run
@@ -52,6 +51,7 @@ TEXT = (
     'fault-free runs of the same profile. Monitor mode and the EKF with states get the chamber '
     'pressure.'
 )
+Recorded = Mapping[str, np.ndarray]  # the columns of one run
 Alarms = NDArray[np.float64]  # instants of rising edges, s
 
 
@@ -154,19 +154,21 @@ def _samples(columns: Mapping[str, np.ndarray], clean: Mapping[str, np.ndarray])
 
 
 def _limited(
-    statistic: Callable[[Any], Floats], noisy: Mapping[str, Any], quiet: list[Any]
+    statistic: Callable[[Recorded], Floats],
+    noisy: Mapping[str, Recorded],
+    quiet: Sequence[Recorded],
 ) -> dict[str, Alarms]:
     """Return the alarms of a statistic whose limit comes from fault-free runs."""
     return _over(MARGIN * max(float(statistic(q).max()) for q in quiet), statistic, noisy)
 
 
 def _over(
-    limit: float, statistic: Callable[[Any], Floats], noisy: Mapping[str, Any]
+    limit: float, statistic: Callable[[Recorded], Floats], noisy: Mapping[str, Recorded]
 ) -> dict[str, Alarms]:
     return {name: _rising(c['stamp'] / 1e9, statistic(c) >= limit) for name, c in noisy.items()}
 
 
-def _baseline(name: str, noisy: Mapping[str, Any], quiet: list[Any]) -> list[Row]:
+def _baseline(name: str, noisy: Mapping[str, Recorded], quiet: Sequence[Recorded]) -> list[Row]:
     """Return the row of one baseline, none for what does not run at this rate."""
     detector = find_detector(name)()
     if name in ('scada', 'fixed_r1', 'fixed_r2'):
@@ -190,11 +192,11 @@ def _baseline(name: str, noisy: Mapping[str, Any], quiet: list[Any]) -> list[Row
     return [Row(detector.title, alarms)]
 
 
-def _states(noisy: Mapping[str, Any], quiet: list[Any]) -> list[Row]:
+def _states(noisy: Mapping[str, Recorded], quiet: Sequence[Recorded]) -> list[Row]:
     ekf = FrictionSpringEkf(1.0 / RATE)
     learned = slice(int(SETTLED * RATE), int(LEARN_UNTIL * RATE))
 
-    def statistic(columns: Any) -> Floats:
+    def statistic(columns: Recorded) -> Floats:
         values = ekf.statistic(dict(columns), 2.0 * NOISE, learned)
         return np.where(columns['stamp'] >= LEARN_UNTIL * 1e9, values, 0.0)
 
@@ -221,7 +223,7 @@ def _scada() -> dict[str, Alarms]:
     settings = ScadaSettings(t_on_s=SETTLED, learn_s=long.duration)
     detector = Scada(settings)
 
-    def record(scenario: Any, seed: int) -> Floats:
+    def record(scenario: Scenario, seed: int) -> Floats:
         columns = simulate(scenario, rate=1.0, noise=True, seed=seed)
         return _samples(columns, simulate(scenario, rate=1.0, duration=scenario.duration))
 

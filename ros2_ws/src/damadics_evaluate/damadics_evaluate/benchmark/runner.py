@@ -10,7 +10,6 @@ from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
 
 from damadics_evaluate.baselines import DETECTORS
 from damadics_evaluate.benchmark.campaign import (
@@ -30,7 +29,8 @@ from damadics_evaluate.scenarios.trajectories import learning_hour, scenario_run
 RESULTS = 'results.jsonl'
 MANIFEST = 'campaign.json'
 CHECKED_ON = 'f11_B'  # the run on which detectors of one's own are checked
-Unit = tuple[Callable[..., list[Result]], tuple[Any, ...]]
+Key = tuple[str, int, str]  # scenario, seed, detector
+Unit = tuple[Callable[..., list[Result]], tuple[Campaign | Limits | str | int, ...]]
 
 
 def read_results(directory: Path) -> list[Result]:
@@ -116,17 +116,17 @@ def _write_manifest(campaign: Campaign, directory: Path) -> None:
     file.write_text(json.dumps(manifest, indent=2), encoding='utf-8')
 
 
-def _key(result: Result) -> tuple[Any, ...]:
+def _key(result: Result) -> Key:
     return result.get('scenario', 'nominal'), result['seed'], result['detector']
 
 
-def _missing(campaign: Campaign, name: str, seed: int, done: set[tuple[Any, ...]]) -> Campaign:
+def _missing(campaign: Campaign, name: str, seed: int, done: set[Key]) -> Campaign:
     """Return the campaign with those detectors that have no result of this unit yet."""
     left = tuple(d for d in campaign.detectors if (name, seed, d) not in done)
     return replace(campaign, detectors=left)
 
 
-def _nominal_units(campaign: Campaign, done: set[tuple[Any, ...]]) -> Iterator[Unit]:
+def _nominal_units(campaign: Campaign, done: set[Key]) -> Iterator[Unit]:
     for seed in range(CALIBRATION_SEED, CALIBRATION_SEED + campaign.calibration_days):
         part = _missing(campaign, 'nominal', seed, done)
         part = replace(
@@ -140,9 +140,7 @@ def _nominal_units(campaign: Campaign, done: set[tuple[Any, ...]]) -> Iterator[U
             yield nominal_unit, (part, seed)
 
 
-def _scenario_units(
-    campaign: Campaign, limit: Limits, done: set[tuple[Any, ...]]
-) -> Iterator[Unit]:
+def _scenario_units(campaign: Campaign, limit: Limits, done: set[Key]) -> Iterator[Unit]:
     by_length = sorted(campaign.scenarios, key=lambda name: -case(name).duration)
     for name in by_length:  # the longest first, so that no core waits at the end
         for seed in campaign.seeds:

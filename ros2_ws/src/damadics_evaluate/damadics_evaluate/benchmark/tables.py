@@ -7,15 +7,14 @@ import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from statistics import median
-from typing import Any
 
 import numpy as np
 
+from damadics_evaluate.benchmark.results import Result
 from damadics_evaluate.benchmark.units import FACTORS
 from damadics_evaluate.indices import T_FROM, T_ON
 from damadics_evaluate.scenarios.cases import SCENARIOS, case
 
-Result = dict[str, Any]
 NOT_OBSERVABLE = {
     'f8': 'scales a play of 1 % by at most 1.4: below the sensor noise',
     'f14': 'touches the chamber pressure only, which is not among the signals',
@@ -51,7 +50,7 @@ def delays(group: Sequence[Result]) -> list[float]:
     return [math.inf if r['indices']['t_dt'] is None else r['indices']['t_dt'] for r in group]
 
 
-def summary(results: Sequence[Result]) -> list[dict[str, Any]]:
+def summary(results: Sequence[Result]) -> list[Result]:
     """
     Return one row per scenario and detector.
 
@@ -101,7 +100,7 @@ def _share(values: Iterable[bool]) -> float:
     return sum(listed) / len(listed) if listed else math.nan
 
 
-def write_csv(rows: Sequence[dict[str, Any]], file: Path) -> None:
+def write_csv(rows: Sequence[Result], file: Path) -> None:
     """Write rows of one shape as CSV; empty cells for what is undefined."""
     with file.open('w', newline='', encoding='utf-8') as stream:
         writer = csv.DictWriter(stream, list(rows[0]))
@@ -117,7 +116,7 @@ def write_csv(rows: Sequence[dict[str, Any]], file: Path) -> None:
 
 def false_alarms(
     results: Sequence[Result], limit: dict[str, float], first_seed: int
-) -> list[dict[str, Any]]:
+) -> list[Result]:
     """
     Return per detector the fault-free days and on how many of them it alarmed.
 

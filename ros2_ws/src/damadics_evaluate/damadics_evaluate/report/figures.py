@@ -5,15 +5,15 @@
 import io
 import math
 import re
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from damadics_fd.figures.panels import BLUE, GREY, ORANGE, STYLE
 
 from damadics_evaluate.baselines.scada import SIGNATURE
+from damadics_evaluate.benchmark.results import Result
 from damadics_evaluate.benchmark.tables import (
-    Result,
     delays,
     operating_curve,
     scenario_results,
@@ -22,12 +22,16 @@ from damadics_evaluate.benchmark.tables import (
 from damadics_evaluate.detectors.find import title_of
 from damadics_evaluate.scenarios.cases import SCENARIOS, case
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
 STEPS = 40  # of a delay curve; more would not be seen
 STRENGTHS = {'S': 0.25, 'M': 0.5, 'B': 0.75}
 OTHERS = ('#e07b00', '#2e8b57', '#8a4fa8', '#c8102e', '#5a6068', '#00838f', '#b58900', '#6b8e23')
 
 
-def _draw(size: tuple[float, float], draw: Any) -> str:
+def _draw(size: tuple[float, float], draw: 'Callable[[Figure, Axes], None]') -> str:
     """Return what `draw(axis)` makes of an empty axis, as SVG."""
     try:
         from markupsafe import Markup
@@ -78,7 +82,7 @@ def delay_curves(results: Sequence[Result], detectors: Sequence[str]) -> str:
     """Return the share of observable runs detected within a delay, per detector."""
     grouped = scenario_results(results)
 
-    def draw(_: Any, axis: Any) -> None:
+    def draw(_: 'Figure', axis: 'Axes') -> None:
         for name, (colour, width, dash) in _colours(detectors).items():
             values = sorted(
                 t
@@ -117,7 +121,7 @@ def delay_curves(results: Sequence[Result], detectors: Sequence[str]) -> str:
 def operating_curves(results: Sequence[Result], limits: dict[str, float], first_seed: int) -> str:
     """Return missed runs against hours with a false exceedance per day, over the limit."""
 
-    def draw(_: Any, axis: Any) -> None:
+    def draw(_: 'Figure', axis: 'Axes') -> None:
         for name, (colour, width, dash) in _colours(list(limits)).items():
             if name not in limits:
                 continue
@@ -163,7 +167,7 @@ def detectability(results: Sequence[Result], detector: str = 'scada') -> str:
         found = sorted(delays(group))
         points.setdefault(case(scenario).fault, []).append((strength, found[len(found) // 2]))
 
-    def draw(_: Any, axis: Any) -> None:
+    def draw(_: 'Figure', axis: 'Axes') -> None:
         missed = 1400.0
         for i, (fault, pairs) in enumerate(sorted(points.items())):
             pairs.sort()
@@ -202,7 +206,7 @@ def heat_map(results: Sequence[Result]) -> str:
     names = [name for name in SCENARIOS if name in rows]
     floor = 3e-4
 
-    def draw(figure: Any, axis: Any) -> None:
+    def draw(figure: 'Figure', axis: 'Axes') -> None:
         values = np.array([rows[name] for name in names])
         size = np.log10(np.maximum(np.abs(values), floor) / floor)
         image = axis.imshow(
@@ -225,7 +229,7 @@ def heat_map(results: Sequence[Result]) -> str:
     return _draw((7.0, 8.4), draw) if names else ''
 
 
-def delay_bars(rows: Sequence[dict[str, Any]]) -> str:
+def delay_bars(rows: Sequence[Result]) -> str:
     """Return the median delay of the monitor against the best baseline, per scenario."""
     ours = {r['scenario']: r['t_dt_median'] for r in rows if r['detector'] == 'scada'}
     best: dict[str, float] = {}
@@ -234,7 +238,7 @@ def delay_bars(rows: Sequence[dict[str, Any]]) -> str:
             best[r['scenario']] = min(best.get(r['scenario'], math.inf), r['t_dt_median'])
     names = [name for name in SCENARIOS if name in ours]
 
-    def draw(_: Any, axis: Any) -> None:
+    def draw(_: 'Figure', axis: 'Axes') -> None:
         for values, colour, shift, label in (
             (ours, BLUE, -0.2, title_of('scada')),
             (best, ORANGE, 0.2, "best baseline without the monitor's model"),

@@ -27,7 +27,7 @@ ValueError: counter: recent missing or unknown
 
 import inspect
 import reprlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import (
     Annotated,
     Any,
@@ -48,6 +48,7 @@ Ints: TypeAlias = NDArray[np.int64]
 Array: TypeAlias = NDArray[np.void]
 Plain: TypeAlias = None | bool | int | float | str | list['Plain'] | dict[str, 'Plain']
 Saved: TypeAlias = dict[str, Plain]
+Json: TypeAlias = None | bool | int | float | str | Sequence['Json'] | Mapping[str, 'Json']
 
 R = TypeVar('R', covariant=True)
 KINDS: dict[object, str] = {int: 'i8', float: 'f8', bool: '?'}

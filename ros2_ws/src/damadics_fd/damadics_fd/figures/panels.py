@@ -4,7 +4,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 from damadics_fd.core.modes import PHASE_MONITOR, PHASE_PAPER
 from damadics_fd.core.result import Result
 from damadics_fd.core.stamps import origin
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 POINTS = 3000  # per curve: more than a page can show
 BLUE, ORANGE, RED, GREEN, GREY = '#1f6fb4', '#e07b00', '#c8102e', '#2e8b57', '#8a8f98'
@@ -145,7 +148,7 @@ def six_panels(
 
 
 def _error(
-    axis: Any,
+    axis: 'Axes',
     t: np.ndarray,
     error: np.ndarray,
     armed: NDArray[np.bool_],
@@ -170,7 +173,7 @@ def _error(
     axis.set_title(f'{title}  [{unit}]')
 
 
-def _learning(axis: Any, t: np.ndarray, armed: NDArray[np.bool_], text: str) -> None:
+def _learning(axis: 'Axes', t: np.ndarray, armed: NDArray[np.bool_], text: str) -> None:
     """Shade the time before the first decision."""
     first = int(armed.argmax()) if armed.any() else len(t) - 1
     if first > 0:
@@ -178,7 +181,7 @@ def _learning(axis: Any, t: np.ndarray, armed: NDArray[np.bool_], text: str) -> 
         axis.text(0.5 * (t[0] + t[first]), 0.35, text, color=GREY, ha='center', clip_on=True)
 
 
-def _residual(axis: Any, t: np.ndarray, decisions: np.ndarray) -> None:
+def _residual(axis: 'Axes', t: np.ndarray, decisions: np.ndarray) -> None:
     residual, rho = decisions['residual'], decisions['threshold']
     axis.plot(*envelope(t, residual), color=BLUE, label=r'residual $|\xi_2|$')
     axis.plot(*envelope(t, rho), color=ORANGE, linewidth=1.8, label=r'threshold $\rho$')
@@ -191,7 +194,7 @@ def _residual(axis: Any, t: np.ndarray, decisions: np.ndarray) -> None:
     axis.set_title(r'residual $|\xi_2|$ and threshold $\rho$  [stroke/s]')
 
 
-def _strength(axis: Any, t: np.ndarray, columns: Mapping[str, np.ndarray]) -> float | None:
+def _strength(axis: 'Axes', t: np.ndarray, columns: Mapping[str, np.ndarray]) -> float | None:
     """Draw the truth; return the onset of the fault [s], None where there is none."""
     axis.set_title('fault strength (truth)')
     axis.set_ylim(-0.05, 1.1)
@@ -231,7 +234,7 @@ def _strength(axis: Any, t: np.ndarray, columns: Mapping[str, np.ndarray]) -> fl
     return onset
 
 
-def _decision(axis: Any, t: np.ndarray, result: Result, zero: int, onset: float | None) -> None:
+def _decision(axis: 'Axes', t: np.ndarray, result: Result, zero: int, onset: float | None) -> None:
     fault = result.decisions['fault'].astype(float)
     when, flag = envelope(t, fault)
     counts = when >= (t[0] if onset is None else onset)
@@ -265,7 +268,7 @@ def _decision(axis: Any, t: np.ndarray, result: Result, zero: int, onset: float 
         axis.text(0.5, 0.6, 'no fault flagged', color=GREY, ha='center', transform=axis.transAxes)
 
 
-def _valve(axis: Any, t: np.ndarray, columns: Mapping[str, np.ndarray]) -> None:
+def _valve(axis: 'Axes', t: np.ndarray, columns: Mapping[str, np.ndarray]) -> None:
     axis.plot(*envelope(t, columns['cv']), color=GREY, linewidth=1.2, label='CV')
     axis.plot(*envelope(t, columns['x1']), color=BLUE, linewidth=1.5, label='X')
     axis.set_ylim(-0.05, 1.3)

@@ -3,7 +3,7 @@
 """The valve signature as a picture: force over position, both branches, reference and now."""
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,9 @@ from damadics_fd.core.signature.state import (
 )
 from damadics_fd.core.valve.plug import recoveries
 from damadics_fd.figures.panels import BLUE, GREY, INK, ORANGE, STYLE
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
 MIN_SHARE = 0.75  # of the samples of a block
@@ -194,7 +197,7 @@ def _changed(
 
 
 def _friction_lines(
-    axis: Any, x: Array, middle: Array, band: float, color: str, label: str
+    axis: 'Axes', x: Array, middle: Array, band: float, color: str, label: str
 ) -> None:
     """Draw the branches of a valve with this friction around its spring line."""
     if not np.isfinite(band):
@@ -216,7 +219,7 @@ def _spring_line(signature: Signature, x: Array, dp: Array) -> Array:
 
 
 def _branches(
-    axis: Any, x: Array, y: Array, v: Array, part: NDArray[np.bool_], color: str, label: str
+    axis: 'Axes', x: Array, y: Array, v: Array, part: NDArray[np.bool_], color: str, label: str
 ) -> None:
     for rising, marker, name in ((True, '^', 'closing'), (False, 'v', 'opening')):
         keep = np.flatnonzero(part & ((v > 0.0) == rising))

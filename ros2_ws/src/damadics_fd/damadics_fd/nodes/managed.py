@@ -194,12 +194,14 @@ class MonitoringNode(LifecycleNode, SpinnableNode, ABC):
 
     def _apply(self, changes: list[Parameter]) -> None:
         for change in changes:
+            if change.name not in ('input_timeout', 'max_age') or not isinstance(
+                change.value, float
+            ):
+                continue
             if change.name == 'input_timeout':
                 before, self._timeout = self._timeout, change.value
-            elif change.name == 'max_age':
-                before, self._max_age = self._max_age, change.value
             else:
-                continue
+                before, self._max_age = self._max_age, change.value
             self.get_logger().info(f'{change.name} changed from {before:g} to {change.value:g} s')
         if hasattr(self, 'watch'):
             self.watch.timeout = self._timeout

@@ -4,17 +4,20 @@
 
 from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
-from typing import Any
+from typing import TypeVar
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from damadics_fd.core.field import Given
 from damadics_fd.core.modes import MODES
+from damadics_fd.core.record import Plain
 from damadics_fd.core.settings import Settings, SettingsError, unread
 from damadics_fd.ros.spin import UsageError
 
+T = TypeVar('T')
 DEFAULT_MODE = 'monitor'
 OF_EVERY_NODE = ('use_sim_time', 'start_type_description_service', 'qos_overrides.')
 
@@ -34,13 +37,13 @@ class Parameters:
     def declare(
         self,
         name: str,
-        default: Any,
+        default: T,
         description: str,
         *,
         limits: tuple[float, float] | None = None,
         allowed: Iterable[str] = (),
         live: bool = False,
-    ) -> Any:
+    ) -> T:
         """
         Declare one parameter.
 
@@ -132,7 +135,7 @@ def declare_settings(parameters: Parameters) -> Settings:
     :raises UsageError: listing every mistake in the node's parameters.
     """
     mode = parameters.declare('mode', DEFAULT_MODE, 'how the approximator is run', allowed=MODES)
-    values = {}
+    values: dict[str, Given] = {}
     for entry in Settings.describe(mode):
         if entry['name'] == 'mode':
             continue
@@ -141,9 +144,10 @@ def declare_settings(parameters: Parameters) -> Settings:
             continue
         unit = f' [{entry["unit"]}]' if entry['unit'] else ''
         default = entry['default']
+        plain: Plain = [*default] if isinstance(default, tuple) else default
         values[entry['name']] = parameters.declare(
             entry['name'],
-            list(default) if isinstance(default, tuple) else default,
+            plain,
             entry['description'] + unit,
             limits=(entry['low'], entry['high']) if type(default) in (int, float) else None,
             allowed=entry.get('choices', ()),

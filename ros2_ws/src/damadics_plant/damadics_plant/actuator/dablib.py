@@ -9,10 +9,10 @@ play; the plug force is held over a step. Outputs show the state before the step
 """
 
 import math
-from typing import Any
 
 import numpy as np
 from damadics_fd.core.jit import jit
+from damadics_fd.core.record import Floats, Record, Rows
 from damadics_fd.core.valve.flow import vapour_pressure
 from damadics_fd.core.valve.pneumatics import (
     ATMOSPHERE,
@@ -23,37 +23,34 @@ from damadics_fd.core.valve.pneumatics import (
 )
 
 from damadics_plant.actuator.measure import measure
-from damadics_plant.actuator.parameters import Actuator
-from damadics_plant.actuator.physics import Record, plug_force
-from damadics_plant.faults.effects import update_effects
+from damadics_plant.actuator.parameters import Actuator, Constants
+from damadics_plant.actuator.physics import plug_force
+from damadics_plant.faults.effects import Effects, FaultRow, update_effects
 
 RATE = 400.0
 """Steps per second."""
 
-STATE_DTYPE = np.dtype(
-    (
-        np.record,
-        [
-            ('y1', 'f8'),
-            ('y2', 'f8'),  # set-point filter [1]
-            ('ma', 'f8'),
-            ('p', 'f8'),  # air in the chamber [kg], its absolute pressure [Pa]
-            ('v', 'f8'),
-            ('x', 'f8'),  # stem before the play [m/s, m]
-            ('x_', 'f8'),
-            ('xp_', 'f8'),
-            ('up', 'i8'),  # history of the play: in, out, direction
-            ('X_', 'f8'),
-            ('ps_', 'f8'),
-            ('at_stop', 'i8'),  # memory: position [m], pressure [Pa], stops
-            ('xb', 'f8'),
-            ('e', 'f8'),  # position feedback [m], held E/P output
-            ('t1', 'f8'),
-            ('pv', 'f8'),  # medium [degC], its vapour pressure [Pa]
-            ('k', 'i8'),  # steps done
-        ],
-    )
-)
+
+class State(Record):
+    """State of the model between two steps."""
+
+    y1: float
+    y2: float  # set-point filter [1]
+    ma: float
+    p: float  # air in the chamber [kg], its absolute pressure [Pa]
+    v: float
+    x: float  # stem before the play [m/s, m]
+    x_: float
+    xp_: float
+    up: int  # history of the play: in, out, direction
+    X_: float
+    ps_: float
+    at_stop: int  # memory: position [m], pressure [Pa], stops
+    xb: float
+    e: float  # position feedback [m], held E/P output
+    t1: float
+    pv: float  # medium [degC], its vapour pressure [Pa]
+    k: int  # steps done
 
 
 def initial_state(a: Actuator) -> np.ndarray:
@@ -63,7 +60,7 @@ def initial_state(a: Actuator) -> np.ndarray:
     :param a: constants of the actuator.
     :return: structured array of shape (1,).
     """
-    state = np.zeros(1, STATE_DTYPE)
+    state = State.rows()
     state['p'] = ATMOSPHERE
     state['ma'] = ATMOSPHERE * a.dead_volume / (a.gas_constant * a.air_temperature)
     state['at_stop'] = 1
@@ -72,7 +69,7 @@ def initial_state(a: Actuator) -> np.ndarray:
 
 
 @jit
-def _play(x: float, s: Record, width: float) -> tuple[float, int]:
+def _play(x: float, s: State, width: float) -> tuple[float, int]:
     up = s.up
     if x > s.x_:
         up = 1
@@ -92,9 +89,9 @@ def _derivatives(
     inflow: float,
     held: float,
     width: float,
-    s: Record,
-    a: Record,
-    e: Record,
+    s: State,
+    a: Constants,
+    e: Effects,
 ) -> tuple[float, float, float]:
     xp, _ = _play(x, s, width)
     X = min(max(xp, 0.0), e.stop)
@@ -112,11 +109,11 @@ def _derivatives(
 
 @jit
 def simulate_block(
-    state: Any,
-    constants: Any,
-    faults: Any,
-    f: Any,
-    effects: Any,
+    state: Rows[State],
+    constants: Rows[Constants],
+    faults: Rows[FaultRow],
+    f: Floats,
+    effects: Rows[Effects],
     inputs: np.ndarray,
     rate: float,
     every: int,
@@ -125,11 +122,11 @@ def simulate_block(
     """
     Advance the plant over a block of steps and sample its outputs.
 
-    :param state: of shape (1,), `STATE_DTYPE`; updated.
+    :param state: of shape (1,), of `State`; updated.
     :param constants: `Actuator.record()`.
     :param faults: `fault_table`.
     :param f: work space of shape (20,).
-    :param effects: of shape (1,), `EFFECTS_DTYPE`; updated.
+    :param effects: of shape (1,), of `Effects`; updated.
     :param inputs: CV at the positioner, P1 [Pa], P2 [Pa], T1 [degC]; shape (4, steps).
     :param rate: steps per second, 400.
     :param every: steps per sample; the first step of the block is sampled.

@@ -9,17 +9,17 @@ Newton for half a step; twice the half step is the implicit midpoint rule, of se
 """
 
 import math
-from typing import Any
 
 import numpy as np
 from damadics_fd.core.jit import jit
+from damadics_fd.core.record import Floats, Record, Rows
 from damadics_fd.core.valve.flow import vapour_pressure
 from damadics_fd.core.valve.pneumatics import ATMOSPHERE, air_flow, set_point_filter, transducer
 
 from damadics_plant.actuator.measure import measure
-from damadics_plant.actuator.parameters import LuGreActuator
-from damadics_plant.actuator.physics import Record, plug_force, plug_stiffness
-from damadics_plant.faults.effects import update_effects
+from damadics_plant.actuator.parameters import Constants, LuGreActuator
+from damadics_plant.actuator.physics import plug_force, plug_stiffness
+from damadics_plant.faults.effects import Effects, FaultRow, update_effects
 
 RATE = 200.0
 """Natural rate [Hz]; slower samples are every n-th of at least these."""
@@ -30,26 +30,23 @@ SUBSTEP = 1e-3
 JERK = 0.01
 """Change of velocity in a substep beyond which the substep is done again in four [m/s]."""
 
-STATE_DTYPE = np.dtype(
-    (
-        np.record,
-        [
-            ('y1', 'f8'),
-            ('y2', 'f8'),  # set-point filter [1]
-            ('ma', 'f8'),  # air in the chamber [kg]
-            ('v', 'f8'),
-            ('x', 'f8'),
-            ('z', 'f8'),  # stem [m/s, m], bristles [m]
-            ('xb', 'f8'),
-            ('e', 'f8'),  # position feedback [m], held E/P output
-            ('t1', 'f8'),
-            ('pv', 'f8'),  # medium [degC], its vapour pressure [Pa]
-            ('k', 'i8'),
-            ('substep', 'i8'),
-            ('held', 'i8'),  # ticks, substeps and holds done
-        ],
-    )
-)
+
+class State(Record):
+    """State of the model between two steps."""
+
+    y1: float
+    y2: float  # set-point filter [1]
+    ma: float  # air in the chamber [kg]
+    v: float
+    x: float
+    z: float  # stem [m/s, m], bristles [m]
+    xb: float
+    e: float  # position feedback [m], held E/P output
+    t1: float
+    pv: float  # medium [degC], its vapour pressure [Pa]
+    k: int
+    substep: int
+    held: int  # ticks, substeps and holds done
 
 
 def initial_state(a: LuGreActuator) -> np.ndarray:
@@ -59,7 +56,7 @@ def initial_state(a: LuGreActuator) -> np.ndarray:
     :param a: constants of the actuator.
     :return: structured array of shape (1,).
     """
-    state = np.zeros(1, STATE_DTYPE)
+    state = State.rows()
     state['ma'] = ATMOSPHERE * a.dead_volume / (a.gas_constant * a.air_temperature)
     state['t1'] = math.nan
     return state
@@ -74,7 +71,7 @@ def _half_step(
     force: float,
     stiffness: float,
     scale: float,
-    a: Record,
+    a: Constants,
 ) -> tuple[float, float]:
     """
     Solve one implicit Euler step of stem and bristles for the new velocity.
@@ -122,7 +119,7 @@ def _half_step(
 
 
 @jit
-def _substep(s: Record, a: Record, e: Record, dp: float, h: float) -> None:
+def _substep(s: State, a: Constants, e: Effects, dp: float, h: float) -> None:
     rt = a.gas_constant * a.air_temperature
     volume = a.dead_volume + e.area * s.x
     p = s.ma * rt / volume
@@ -155,11 +152,11 @@ def _substep(s: Record, a: Record, e: Record, dp: float, h: float) -> None:
 
 @jit
 def simulate_block(
-    state: Any,
-    constants: Any,
-    faults: Any,
-    f: Any,
-    effects: Any,
+    state: Rows[State],
+    constants: Rows[Constants],
+    faults: Rows[FaultRow],
+    f: Floats,
+    effects: Rows[Effects],
     inputs: np.ndarray,
     rate: float,
     every: int,
@@ -168,11 +165,11 @@ def simulate_block(
     """
     Advance the plant over a block of ticks and sample its outputs.
 
-    :param state: of shape (1,), `STATE_DTYPE`; updated.
+    :param state: of shape (1,), of `State`; updated.
     :param constants: `LuGreActuator.record()`.
     :param faults: `fault_table`.
     :param f: work space of shape (20,).
-    :param effects: of shape (1,), `EFFECTS_DTYPE`; updated.
+    :param effects: of shape (1,), of `Effects`; updated.
     :param inputs: CV at the positioner, P1 [Pa], P2 [Pa], T1 [degC]; shape (4, ticks).
     :param rate: ticks per second, each of as many substeps as needed.
     :param every: ticks per sample; the first tick of the block is sampled.

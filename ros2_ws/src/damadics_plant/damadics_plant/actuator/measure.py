@@ -6,8 +6,9 @@ import numpy as np
 from damadics_fd.core.jit import jit
 from damadics_fd.core.valve.flow import density
 
-from damadics_plant.actuator.physics import Record
+from damadics_plant.actuator.parameters import Constants
 from damadics_plant.actuator.valve import valve_flow
+from damadics_plant.faults.effects import Effects
 
 OUTPUTS = ('x1', 'p1', 'p2', 't1', 'flow', 'ps', 'fault', 'strength')
 """Rows of the output of a model, in SI; the last row after them is the true flow [kg/s]."""
@@ -24,8 +25,8 @@ def measure(
     p2: float,
     t1: float,
     pv: float,
-    a: Record,
-    e: Record,
+    a: Constants,
+    e: Effects,
     out: np.ndarray,
 ) -> None:
     """

@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Constants of the DAMADICS actuator (DABLib v1.22) and of its LuGre variant, in one place."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
+from damadics_fd.core.record import Array, Record
 from damadics_fd.core.sample import TABLE
 from damadics_fd.core.valve.parameters import Valve
 from damadics_fd.core.valve.pneumatics import AIR_TEMPERATURE, GAS_CONSTANT
@@ -15,6 +15,37 @@ VALVE = Valve()
 
 RANGES = {signal.name: signal.span for signal in TABLE if signal.name != 'ps'}
 """Upper range value of each transmitter in SI (flow in kg/s: 40 t/h); the lower one is 0."""
+
+
+class Constants(Record):
+    """What compiled code knows of an actuator of either model; units as in `LuGreActuator`."""
+
+    stroke: float
+    mass: float
+    stiffness: float
+    preload: float
+    viscous: float
+    play: float
+    area: float
+    dead_volume: float
+    gravity: float
+    supply: float
+    supply_minimum: float
+    gas_constant: float
+    air_temperature: float
+    air_flow: float
+    leak_flow: float
+    gain: float
+    lag: float
+    hold: float
+    valve_coefficient: float
+    bypass_coefficient: float
+    plug_diameter: float
+    coulomb: float
+    static: float
+    stribeck: float
+    bristle_stiffness: float
+    bristle_damping: float
 
 
 @dataclass(frozen=True)
@@ -70,7 +101,7 @@ class Actuator:
     plug_diameter: float = 1000.0 * VALVE.plug_diameter
     """Diameter of the plug d [mm]."""
 
-    def record(self) -> np.ndarray:
+    def record(self) -> Array:
         """
         Return the constants as a structured array of length 1 for compiled code.
 
@@ -79,9 +110,8 @@ class Actuator:
         >>> float(Actuator().record()[0].stroke)
         0.0381
         """
-        names = [field.name for field in fields(LuGreActuator)]
-        constants = np.zeros(1, np.dtype((np.record, [(name, 'f8') for name in names])))
-        for name in names:
+        constants = Constants.rows()
+        for name in Constants.names():
             constants[name] = getattr(self, name, 0.0)
         return constants
 

@@ -3,14 +3,10 @@
 """Force of the medium on the plug, in the plant's units; the rest is the valve's own physics."""
 
 import math
-from typing import Any
 
 import numpy as np
 from damadics_fd.core.jit import jit
 from damadics_fd.core.valve.plug import RECOVERY, recovery, tangent
-
-Record = Any
-"""A numpy record: settings or state of compiled code."""
 
 KM = np.array(RECOVERY)
 """Pressure recovery coefficient K_m over X_r."""

@@ -8,7 +8,9 @@ from damadics_fd.core.valve.flow import bypass_flow, effective_drop, inherent, m
 from damadics_fd.core.valve.plug import RECOVERY, recovery
 from damadics_fd.core.valve.tables import interpolate
 
-from damadics_plant.actuator.physics import KM, Record
+from damadics_plant.actuator.parameters import Constants
+from damadics_plant.actuator.physics import KM
+from damadics_plant.faults.effects import Effects
 
 EXPONENT = 5.0
 """Of the equal-percentage characteristic."""
@@ -20,7 +22,7 @@ BYPASS_KM = np.array((0.45, *RECOVERY[9::-1]))
 
 @jit
 def valve_flow(
-    xr: float, p1: float, p2: float, pv: float, density: float, a: Record, e: Record
+    xr: float, p1: float, p2: float, pv: float, density: float, a: Constants, e: Effects
 ) -> float:
     """
     Evaluate the flow through valve and bypass.

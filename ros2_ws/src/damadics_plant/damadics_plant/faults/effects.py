@@ -4,12 +4,12 @@
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from damadics_fd.core.jit import jit
+from damadics_fd.core.record import Floats, Record, Rows
 
-from damadics_plant.actuator.physics import Record
+from damadics_plant.actuator.parameters import Constants
 from damadics_plant.faults.catalogue import Fault
 from damadics_plant.faults.time_course import strength_at
 
@@ -17,19 +17,15 @@ FRICTION_GAIN = 20.0
 """Delta F_1 of the LuGre plant at f4 = 1: packing friction of about 20 % of the spring force."""
 
 
-FAULT_DTYPE = np.dtype(
-    (
-        np.record,
-        [
-            ('number', 'i8'),
-            ('strength', 'f8'),
-            ('start', 'f8'),
-            ('end', 'f8'),
-            ('development', 'f8'),
-            ('now', 'f8'),  # signed strength that the effects are made from
-        ],
-    )
-)
+class FaultRow(Record):
+    """One fault."""
+
+    number: int
+    strength: float
+    start: float  # s
+    end: float  # s
+    development: float  # s
+    now: float  # signed strength that the effects are made from
 
 
 def fault_table(faults: Sequence[Fault]) -> np.ndarray:
@@ -39,7 +35,7 @@ def fault_table(faults: Sequence[Fault]) -> np.ndarray:
     :param faults: any number of faults.
     :return: structured array of shape (len(faults),).
     """
-    rows = np.zeros(len(faults), FAULT_DTYPE)
+    rows = FaultRow.rows(len(faults))
     for i, fault in enumerate(faults):
         rows[i] = (
             fault.number,
@@ -52,44 +48,38 @@ def fault_table(faults: Sequence[Fault]) -> np.ndarray:
     return rows
 
 
-EFFECTS_DTYPE = np.dtype(
-    (
-        np.record,
-        [
-            (name, 'f8')
-            for name in (
-                'stop',
-                'xr_offset',
-                'kv_factor',
-                'kv_offset',
-                'flow_factor',
-                'play',
-                'twist',
-                'leak',
-                'area',
-                'spring',
-                'friction',
-                'opening',
-                'position',
-                'ps_sensor',
-                'feedback',
-                'supply',
-                'p1',
-                'p2',
-                'bypass',
-                'flow_sensor',
-                'heat',
-                'number',
-                'strength',
-            )
-        ],
-    )
-)
-"""What the faults change, in the units of the model; filled by `update_effects`."""
+class Effects(Record):
+    """What the faults change, in the units of the model; filled by `update_effects`."""
+
+    stop: float
+    xr_offset: float
+    kv_factor: float
+    kv_offset: float
+    flow_factor: float
+    play: float
+    twist: float
+    leak: float
+    area: float
+    spring: float
+    friction: float
+    opening: float
+    position: float
+    ps_sensor: float
+    feedback: float
+    supply: float
+    p1: float
+    p2: float
+    bypass: float
+    flow_sensor: float
+    heat: float
+    number: float
+    strength: float
 
 
 @jit
-def update_effects(faults: Any, t: float, f: Any, a: Record, e: Record, lugre: bool) -> None:
+def update_effects(
+    faults: Rows[FaultRow], t: float, f: Floats, a: Constants, e: Effects, lugre: bool
+) -> None:
     """
     Evaluate all faults at a time and translate them into what the model uses (table 2.1).
 

@@ -3,11 +3,12 @@
 """Scenarios from YAML files, checked entry by entry."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 import yaml
+from damadics_fd.core.record import Plain, Saved
 
 from damadics_plant.faults.catalogue import CATALOGUE, Fault
 from damadics_plant.scenarios.level import LevelLoop
@@ -39,7 +40,7 @@ def read_scenarios(path: Path) -> dict[str, Scenario]:
         raise ScenarioError(f'{path}: cannot be read: {error.strerror}') from error
     except yaml.YAMLError as error:
         raise ScenarioError(f'{path}: is no YAML: {" ".join(str(error).split())}') from error
-    if not isinstance(content, Mapping):
+    if not isinstance(content, dict):
         raise ScenarioError(f'{path}: wants a mapping of scenario names to scenarios')
     errors: list[str] = []
     scenarios = {}
@@ -64,8 +65,8 @@ class _Reader:
     def wrong(self, key: str, message: str) -> None:
         self.errors.append(f'{self.where}: {key}: {message}')
 
-    def keys(self, key: str, entry: Any, allowed: tuple[str, ...]) -> bool:
-        if not isinstance(entry, Mapping):
+    def keys(self, entry: Plain, key: str, allowed: tuple[str, ...]) -> TypeGuard[Saved]:
+        if not isinstance(entry, dict):
             self.wrong(key, f'wants a mapping with {", ".join(allowed)}')
             return False
         unknown = [str(k) for k in entry if k not in allowed]
@@ -74,22 +75,22 @@ class _Reader:
         return not unknown
 
     def number(
-        self, key: str, value: Any, low: float = -math.inf, high: float = math.inf
+        self, key: str, value: Plain, low: float = -math.inf, high: float = math.inf
     ) -> float:
         try:
-            if isinstance(value, bool):
+            if isinstance(value, bool) or not isinstance(value, int | float | str):
                 raise ValueError
             number = float(value)  # PyYAML reads 3.5e6 as a string
-        except (TypeError, ValueError):
+        except ValueError:
             self.wrong(key, f'{value!r} is no number')
             return math.nan
         if not low <= number <= high:
             self.wrong(key, f'{number:g} is not within {low:g}..{high:g}')
         return number
 
-    def scenario(self, name: str, entry: Any, folder: Path) -> Scenario | None:
+    def scenario(self, name: str, entry: Plain, folder: Path) -> Scenario | None:
         before = len(self.errors)
-        if not self.keys('', entry, _KEYS):
+        if not self.keys(entry, '', _KEYS):
             return None
         if 'duration' not in entry:
             self.wrong('duration', 'is missing; wants the length of the run in s')
@@ -110,8 +111,8 @@ class _Reader:
             **{key: source for key, source in sources.items() if source},
         )
 
-    def fault(self, key: str, entry: Any) -> Fault | None:
-        if not self.keys(key, entry, _FAULT_KEYS):
+    def fault(self, key: str, entry: Plain) -> Fault | None:
+        if not self.keys(entry, key, _FAULT_KEYS):
             return None
         if 'fault' not in entry or entry['fault'] not in CATALOGUE:
             self.wrong(f'{key}.fault', f'{entry.get("fault")!r} is not one of f1..f19')
@@ -133,8 +134,8 @@ class _Reader:
             self.wrong(key, str(error))
             return None
 
-    def source(self, key: str, entry: Any, folder: Path) -> Source | None:
-        if not isinstance(entry, Mapping):
+    def source(self, key: str, entry: Plain, folder: Path) -> Source | None:
+        if not isinstance(entry, dict):
             return Constant(self.number(key, entry))
         if len(entry) != 1 or next(iter(entry)) not in _SOURCES:
             self.wrong(key, f'wants a number or one of {", ".join(_SOURCES)}')
@@ -152,41 +153,40 @@ class _Reader:
         return source if len(self.errors) == before else None
 
 
-def _steps(reader: _Reader, key: str, pairs: Any, _: Path) -> Source | None:
-    if not isinstance(pairs, list) or any(
-        not isinstance(pair, list) or len(pair) != 2 for pair in pairs
-    ):
+def _steps(reader: _Reader, key: str, pairs: Plain, _: Path) -> Source | None:
+    rows = pairs if isinstance(pairs, list) else [None]
+    whole = [row for row in rows if isinstance(row, list) and len(row) == 2]
+    if len(whole) < len(rows):
         reader.wrong(key, 'wants a list of [time in s, value]')
         return None
-    times = tuple(reader.number(f'{key}[{i}][0]', t) for i, (t, _) in enumerate(pairs))
-    values = tuple(reader.number(f'{key}[{i}][1]', v) for i, (_, v) in enumerate(pairs))
+    times = tuple(reader.number(f'{key}[{i}][0]', t) for i, (t, _) in enumerate(whole))
+    values = tuple(reader.number(f'{key}[{i}][1]', v) for i, (_, v) in enumerate(whole))
     return Steps(times, values)
 
 
-def _sine(reader: _Reader, key: str, entry: Any, _: Path) -> Source | None:
+def _sine(reader: _Reader, key: str, entry: Plain, _: Path) -> Source | None:
     names = ('mean', 'amplitude', 'frequency', 'phase')
-    if not reader.keys(key, entry, names):
+    if not reader.keys(entry, key, names):
         return None
     return Sine(*(reader.number(f'{key}.{name}', entry.get(name, 0)) for name in names))
 
 
-def _recorded(reader: _Reader, key: str, entry: Any, folder: Path) -> Source | None:
-    if not reader.keys(key, entry, ('file', 'column', 'scale', 'hold')):
+def _recorded(reader: _Reader, key: str, entry: Plain, folder: Path) -> Source | None:
+    if not reader.keys(entry, key, ('file', 'column', 'scale', 'hold')):
         return None
     for name in ('file', 'column'):
         if not isinstance(entry.get(name), str):
             reader.wrong(f'{key}.{name}', f'{entry.get(name)!r} is no text')
             return None
     scale = reader.number(f'{key}.scale', entry.get('scale', 1))
-    return read_recorded(
-        folder / entry['file'], entry['column'], scale, bool(entry.get('hold', False))
-    )
+    file, column = str(entry['file']), str(entry['column'])
+    return read_recorded(folder / file, column, scale, bool(entry.get('hold', False)))
 
 
-def _level_loop(reader: _Reader, key: str, entry: Any, folder: Path) -> Source | None:
+def _level_loop(reader: _Reader, key: str, entry: Plain, folder: Path) -> Source | None:
     names = ('set_point', 'gain', 'reset_time', 'bias', 'area', 'span', 'period')
     entry = entry or {}
-    if not reader.keys(key, entry, (*names, 'draw')):
+    if not reader.keys(entry, key, (*names, 'draw')):
         return None
     values: dict[str, Any] = {
         name: reader.number(f'{key}.{name}', entry[name]) for name in names if name in entry
@@ -196,10 +196,10 @@ def _level_loop(reader: _Reader, key: str, entry: Any, folder: Path) -> Source |
     return LevelLoop(**values)
 
 
-def _random_steps(reader: _Reader, key: str, entry: Any, _: Path) -> Source | None:
+def _random_steps(reader: _Reader, key: str, entry: Plain, _: Path) -> Source | None:
     names = ('low', 'high', 'shortest', 'longest', 'seed')
     entry = entry or {}
-    if not reader.keys(key, entry, names):
+    if not reader.keys(entry, key, names):
         return None
     values: dict[str, Any] = {
         name: reader.number(f'{key}.{name}', entry[name]) for name in names if name in entry
@@ -209,7 +209,7 @@ def _random_steps(reader: _Reader, key: str, entry: Any, _: Path) -> Source | No
     return RandomSteps(**values)
 
 
-_SOURCES: dict[str, Callable[[_Reader, str, Any, Path], Source | None]] = {
+_SOURCES: dict[str, Callable[[_Reader, str, Plain, Path], Source | None]] = {
     'steps': _steps,
     'sine': _sine,
     'random_steps': _random_steps,

@@ -4,7 +4,7 @@
 
 from collections.abc import Callable, Mapping
 from concurrent.futures import ProcessPoolExecutor
-from typing import Any
+from typing import TypedDict, Unpack
 
 import numpy as np
 from damadics_fd.core.monitor import run
@@ -12,12 +12,23 @@ from damadics_fd.core.settings import Settings
 from damadics_plant import Fault, LuGreActuator, Scenario, simulate
 from damadics_plant.scenarios.sources import RandomSteps, Sine
 
-from damadics_evaluate.campaigns.monitor.sums import summary
+from damadics_evaluate.campaigns.monitor.sums import Summary, summary
 
 RATE = 200.0
 
 
 FRICTION, SPRING = 'f4', 'f11'
+
+
+class Case(TypedDict, total=False):
+    """What differs from a fault-free run, as `random_run` takes it."""
+
+    fault: str
+    strength: float
+    start: float  # s
+    development: float  # s
+    duration: float  # s
+    model: str
 
 
 # the approximator alone: the signature's own alarm is measured by its own campaign
@@ -111,7 +122,7 @@ def paper_run(
     fault: str | None = None,
     development: float = 0.0,
     force_exact: bool = False,
-) -> dict[str, Any]:
+) -> Summary:
     base = simulate('paper_nominal', rate=RATE, duration=0.0).scenario
     faults = () if fault is None else (Fault(fault, 1.0, 70.0, development),)
     scenario = Scenario(
@@ -123,7 +134,7 @@ def paper_run(
     return summary(run(columns, APPROXIMATOR))
 
 
-def hour(seed: int, fault: str, start: float) -> dict[str, Any]:
+def hour(seed: int, fault: str, start: float) -> Summary:
     result = run(random_run(seed, fault, 1.0, start, 3600.0, 3600.0 + start), APPROXIMATOR)
     row = summary(result)
     flags = result.decisions['fault']
@@ -134,7 +145,7 @@ def hour(seed: int, fault: str, start: float) -> dict[str, Any]:
     return row
 
 
-def irregular(seed: int, rate: float, **case: Any) -> dict[str, Any]:
+def irregular(seed: int, rate: float, **case: Unpack[Case]) -> Summary:
     """Sample a fast run at jittered instants, drop every tenth sample at random."""
     fast = random_run(seed, rate=1000.0, **case)
     rng = np.random.default_rng([seed, 9])
@@ -160,15 +171,15 @@ def jittered(fast: Mapping[str, np.ndarray], rng: np.random.Generator) -> dict[s
     return {'stamp': np.round(moved * 1e9).astype(np.int64), **columns}
 
 
-def one(seed: int, settings: Settings = APPROXIMATOR, **case: Any) -> dict[str, Any]:
+def one(seed: int, settings: Settings = APPROXIMATOR, **case: Unpack[Case]) -> Summary:
     return summary(run(random_run(seed, **case), settings))
 
 
-def one_exact(seed: int, **case: Any) -> dict[str, Any]:
+def one_exact(seed: int, **case: Unpack[Case]) -> Summary:
     return summary(run(exact_force(random_run(seed, noise=False, **case), seed), EXACT))
 
 
-def many(job: Callable[[int], dict[str, Any]], seeds: range, workers: int) -> list[dict[str, Any]]:
+def many(job: Callable[[int], Summary], seeds: range, workers: int) -> list[Summary]:
     if workers == 1:
         return [job(seed) for seed in seeds]
     with ProcessPoolExecutor(workers) as pool:

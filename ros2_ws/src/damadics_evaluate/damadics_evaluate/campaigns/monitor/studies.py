@@ -3,7 +3,6 @@
 """The studies, one function each."""
 
 from functools import partial
-from typing import Any
 
 import numpy as np
 from damadics_fd.core.modes import PHASE_MONITOR
@@ -16,6 +15,7 @@ from damadics_evaluate.campaigns.monitor.runs import (
     FRICTION,
     RATE,
     SPRING,
+    Case,
     hour,
     irregular,
     many,
@@ -24,12 +24,13 @@ from damadics_evaluate.campaigns.monitor.runs import (
     paper_run,
     random_scenario,
 )
-from damadics_evaluate.campaigns.monitor.sums import approximator, delays, quiet, seconds
+from damadics_evaluate.campaigns.monitor.sums import approximator, delays, quiet, seconds, told
+from damadics_evaluate.plain import Told
 
 
-def anchors(runs: int, workers: int) -> dict[str, Any]:
+def anchors(runs: int, workers: int) -> Told:
     """Noise-free runs with the control value of the paper, other strengths and variants."""
-    out: dict[str, Any] = {}
+    out: Told = {}
     for name in ('paper_nominal', 'paper_friction', 'paper_spring'):
         for model in ('lugre', 'dablib'):
             result = run(simulate(name, rate=RATE, model=model), APPROXIMATOR)
@@ -52,7 +53,7 @@ def anchors(runs: int, workers: int) -> dict[str, Any]:
         )
         result = run(simulate(scenario, rate=RATE, model='lugre'), APPROXIMATOR)
         out[f'lugre {fault} {strength:+g}'] = seconds(result)
-    variants: dict[str, dict[str, Any]] = {
+    variants: dict[str, dict[str, str | float]] = {
         'threshold of eq. (16)': {'threshold': 'paper'},
         'high-pass .02': {'velocity': 'high_pass'},
         'high-pass .05': {'velocity': 'high_pass', 'tau': 0.05},
@@ -70,7 +71,7 @@ def anchors(runs: int, workers: int) -> dict[str, Any]:
     return out
 
 
-def seeds(runs: int, workers: int) -> dict[str, Any]:
+def seeds(runs: int, workers: int) -> Told:
     """Random control value and noise: the LuGre plant."""
     return {
         'nominal': quiet(many(one, range(runs), workers)),
@@ -90,10 +91,10 @@ def seeds(runs: int, workers: int) -> dict[str, Any]:
     }
 
 
-def exact(runs: int, workers: int) -> dict[str, Any]:
+def exact(runs: int, workers: int) -> Told:
     """Use the condition of the specification's own figures: noise on x1, force of the plant."""
     paper = partial(paper_run, model='dablib', force_exact=True)
-    out = {}
+    out: Told = {}
     for name, few in (('', range(runs)), (', further seeds', range(runs, 6 * runs))):
         out[f'nominal{name}'] = quiet(many(one_exact, few, workers))
         out[f'friction ramp +1{name}'] = delays(
@@ -108,7 +109,7 @@ def exact(runs: int, workers: int) -> dict[str, Any]:
     return out
 
 
-def further(runs: int, workers: int) -> dict[str, Any]:
+def further(runs: int, workers: int) -> Told:
     """Repeat friction and spring with five times as many other seeds."""
     few = range(runs, 6 * runs)
     return {
@@ -119,10 +120,10 @@ def further(runs: int, workers: int) -> dict[str, Any]:
     }
 
 
-def dablib(runs: int, workers: int) -> dict[str, Any]:
+def dablib(runs: int, workers: int) -> Told:
     """Use the same constants on the DABLib plant, control value of the paper and random."""
     job = partial(one, model='dablib')
-    out = {'random, nominal': quiet(many(job, range(runs), workers))}
+    out: Told = {'random, nominal': quiet(many(job, range(runs), workers))}
     paper = partial(paper_run, model='dablib')
     out['paper, nominal'] = quiet(many(paper, range(runs), workers))
     out['paper, f4'] = delays(
@@ -132,16 +133,16 @@ def dablib(runs: int, workers: int) -> dict[str, Any]:
     return out
 
 
-def fault_free(runs: int, workers: int) -> dict[str, Any]:
+def fault_free(runs: int, workers: int) -> Told:
     """Many fault-free runs; seeds other than those of the other studies."""
     many_runs = range(1000, 1000 + (200 if runs >= 30 else runs))
-    out = {'approximator': quiet(many(one, many_runs, workers))}
+    out: Told = {'approximator': quiet(many(one, many_runs, workers))}
     both = partial(one, settings=Settings.for_mode('monitor'))
     out['with the own alarm of the signature'] = quiet(many(both, many_runs, workers))
     return out
 
 
-def day(runs: int, workers: int) -> dict[str, Any]:
+def day(runs: int, workers: int) -> Told:
     """24 h without a fault: no alarm, weights and threshold bit-identical."""
     hours = 24.0 if runs >= 30 else 0.25
     scenario, valve = random_scenario(7, hours * 3600.0)
@@ -167,15 +168,15 @@ def day(runs: int, workers: int) -> dict[str, Any]:
     }
 
 
-def masking(runs: int, workers: int) -> dict[str, Any]:
+def masking(runs: int, workers: int) -> Told:
     """Incipient faults of an hour, after arming and during learning."""
     few = range(max(1, runs // 6))
-    out: dict[str, Any] = {}
+    out: Told = {}
     for start in (70.0, 30.0, 10.0):
         for fault in (FRICTION, SPRING):
             rows = many(partial(hour, fault=fault, start=start), few, workers)
-            out[f'{fault} over 1 h from {start:g} s'] = rows
-    quick: dict[str, dict[str, Any]] = {
+            out[f'{fault} over 1 h from {start:g} s'] = [told(row) for row in rows]
+    quick: dict[str, Case] = {
         'friction ramp 20 s from 30 s': {'fault': FRICTION, 'start': 30.0, 'development': 20.0},
         'friction ramp 20 s from 55 s': {'fault': FRICTION, 'start': 55.0, 'development': 20.0},
         'friction ramp 300 s from 20 s': {
@@ -199,22 +200,22 @@ def masking(runs: int, workers: int) -> dict[str, Any]:
     return out
 
 
-def rates(runs: int, workers: int) -> dict[str, Any]:
+def rates(runs: int, workers: int) -> Told:
     """Other sample rates, jitter of half a period, one sample in ten dropped."""
-    out: dict[str, Any] = {}
+    out: Told = {}
     some = range(max(2, runs // 3))
     for rate in (50.0, 100.0, 200.0, 500.0, 1000.0):
         for name, case in (
-            ('nominal', {}),
-            ('friction', {'fault': FRICTION, 'development': 20.0}),
-            ('spring', {'fault': SPRING}),
+            ('nominal', Case()),
+            ('friction', Case(fault=FRICTION, development=20.0)),
+            ('spring', Case(fault=SPRING)),
         ):
             rows = many(partial(irregular, rate=rate, **case), some, workers)
             out[f'{rate:g} Hz {name}'] = quiet(rows) if name == 'nominal' else delays(rows)
     return out
 
 
-def slow(runs: int, workers: int) -> dict[str, Any]:
+def slow(runs: int, workers: int) -> Told:
     """1e6 samples at 1 Hz into an observer set up for 200 Hz: finite throughout."""
     n = 1_000_000 if runs >= 30 else 20_000
     rng = np.random.default_rng(1)

@@ -2,12 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a run amounts to, and many of them."""
 
-from typing import Any
+from typing import NotRequired, TypedDict
 
 import numpy as np
 from damadics_fd.core.approximator.estimator import Estimator
 from damadics_fd.core.modes import PHASE_MONITOR
 from damadics_fd.core.result import Result
+
+from damadics_evaluate.plain import Told
 
 
 def seconds(result: Result) -> list[float]:
@@ -20,7 +22,19 @@ def approximator(result: Result) -> Estimator:
     return result.estimator
 
 
-def summary(result: Result) -> dict[str, Any]:
+class Summary(TypedDict):
+    """What one run amounts to."""
+
+    alarms: list[float]  # s
+    refusals: int  # to arm
+    armed: float | None  # s, since when it monitors
+    phi: float
+    ratio: float  # largest residual / threshold
+    strength_at_alarm: NotRequired[float | None]
+    stays_flagged: NotRequired[bool]
+
+
+def summary(result: Result) -> Summary:
     phase = result.estimates['phase']
     armed = np.flatnonzero(phase == PHASE_MONITOR)
     decisions = result.decisions
@@ -36,7 +50,20 @@ def summary(result: Result) -> dict[str, Any]:
     }
 
 
-def delays(rows: list[dict[str, Any]], start: float = 70.0) -> dict[str, Any]:
+def told(row: Summary) -> Told:
+    """Return the summary of a run with an incipient fault for JSON."""
+    return {
+        'alarms': row['alarms'],
+        'refusals': row['refusals'],
+        'armed': row['armed'],
+        'phi': row['phi'],
+        'ratio': row['ratio'],
+        'strength_at_alarm': row.get('strength_at_alarm'),
+        'stays_flagged': row.get('stays_flagged'),
+    }
+
+
+def delays(rows: list[Summary], start: float = 70.0) -> Told:
     """Sum up runs with a fault: false alarms before it, misses, time of the first alarm."""
     early = sum(any(t < start for t in row['alarms']) for row in rows)
     first = [min((t for t in row['alarms'] if t >= start), default=np.inf) for row in rows]
@@ -54,7 +81,7 @@ def delays(rows: list[dict[str, Any]], start: float = 70.0) -> dict[str, Any]:
     }
 
 
-def quiet(rows: list[dict[str, Any]]) -> dict[str, Any]:
+def quiet(rows: list[Summary]) -> Told:
     """Sum up runs without a fault."""
     ratio = [row['ratio'] for row in rows]
     return {

@@ -19,15 +19,15 @@ import json
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from damadics_evaluate.campaigns.signature.errors import cost, plug, sensors, supply
 from damadics_evaluate.campaigns.signature.names import isolation
 from damadics_evaluate.campaigns.signature.quiet import day, healthy, patterns
 from damadics_evaluate.campaigns.signature.sizes import drift, small, strong
 from damadics_evaluate.campaigns.signature.valves import NOISE
+from damadics_evaluate.plain import Told
 
-PARTS: dict[str, tuple[Callable[[int], dict[str, Any]], int]] = {
+PARTS: dict[str, tuple[Callable[[int], Told], int]] = {
     'isolation': (isolation, 34),
     'small': (small, 30),
     'strong': (strong, 32),
@@ -66,7 +66,8 @@ def main() -> None:
         result['minutes'] = round((time.perf_counter() - start) / 60, 1)
         found[f'{part}, noise {options.noise}'] = result
         options.out.write_text(json.dumps(found, indent=1))
-        for row in result.get('rows', []):
+        rows = result.get('rows', [])
+        for row in rows if isinstance(rows, list) else ():
             print(row)
         print({k: v for k, v in result.items() if k != 'rows'})
 

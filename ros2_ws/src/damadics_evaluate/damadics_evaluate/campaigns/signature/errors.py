@@ -5,7 +5,6 @@
 import time
 from collections import Counter
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from damadics_fd.core.monitor import run
@@ -23,9 +22,10 @@ from damadics_evaluate.campaigns.signature.valves import (
     plant_run,
     quantiles,
 )
+from damadics_evaluate.plain import Told
 
 
-def plug(runs: int) -> dict[str, Any]:
+def plug(runs: int) -> Told:
     """Wrong plug force table in the detector: own alarms without a fault, and what is found."""
     rng = np.random.default_rng(9)
     table = np.asarray(SETTINGS.plug_table)
@@ -60,7 +60,7 @@ def plug(runs: int) -> dict[str, Any]:
         'friction +1': (Fault('f4', 0.05, 230.0),),
         'spring +5 %': (Fault('f11', 0.05, 230.0),),
     }
-    rows = []
+    rows: list[Told] = []
     for name, faults in cases.items():
         found: dict[str, Counter[str]] = {key: Counter() for key in errors}
         kappa = dict.fromkeys(errors, 0.0)
@@ -98,7 +98,7 @@ def plug(runs: int) -> dict[str, Any]:
     return {'rows': rows}
 
 
-def sensors(runs: int) -> dict[str, Any]:
+def sensors(runs: int) -> Told:
     """Sensor faults in the measurement only: name and size from stage 2."""
 
     def change(name: str, gain: float = 0.0, offset: float = 0.0) -> Callable[[Columns], None]:
@@ -156,7 +156,7 @@ def sensors(runs: int) -> dict[str, Any]:
     return {'rows': rows}
 
 
-def supply(runs: int) -> dict[str, Any]:
+def supply(runs: int) -> Told:
     """Loss of supply pressure (f16) from 300 s on, and leaks (f9), told from the filling rate."""
     rows = []
     for name, fault in (
@@ -185,7 +185,7 @@ def supply(runs: int) -> dict[str, Any]:
     return {'rows': rows}
 
 
-def cost(_: int) -> dict[str, Any]:
+def cost(_: int) -> Told:
     """Time per sample in the compiled loop, with and without the signature."""
     columns = plant_run(1, 1200.0)
     times = {}

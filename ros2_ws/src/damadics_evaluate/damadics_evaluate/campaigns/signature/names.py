@@ -5,7 +5,6 @@
 from collections import Counter
 from collections.abc import Callable
 from functools import partial
-from typing import Any
 
 import numpy as np
 from damadics_fd.core.monitor import run
@@ -24,9 +23,10 @@ from damadics_evaluate.campaigns.signature.valves import (
     share,
     stiffened,
 )
+from damadics_evaluate.plain import Told
 
 
-def isolation(runs: int) -> dict[str, Any]:
+def isolation(runs: int) -> Told:
     """Friction against the elastic family at several times after the alarm."""
     cases: list[tuple[str, str, str, Callable[[float], Build]]] = [
         ('lugre', 'friction', 'ramp to +20', lambda t: ((Fault('f4', 1.0, t, 20.0),), {})),

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Fault-free runs: other patterns of the control value, a day."""
 
-from typing import Any
-
 import numpy as np
 from damadics_fd.core.monitor import run
 from damadics_plant import LuGreActuator, Scenario
@@ -11,9 +9,10 @@ from damadics_plant.scenarios.sources import RandomSteps, Sine, Steps
 from tqdm import tqdm
 
 from damadics_evaluate.campaigns.signature.valves import RATE, SETTINGS, disturb, plant_run
+from damadics_evaluate.plain import Told
 
 
-def healthy(runs: int) -> dict[str, Any]:
+def healthy(runs: int) -> Told:
     """Fault-free runs: alarms of either source, largest evidence, lowest filling rate."""
     alarms, own, worst, kappa, fill = 0, 0, [], [], []
     for k in tqdm(range(runs), desc='healthy'):
@@ -62,7 +61,7 @@ def later_pattern(kind: str, seed: int, start: float, end: float) -> Steps:
     return Steps(times, values)
 
 
-def patterns(runs: int) -> dict[str, Any]:
+def patterns(runs: int) -> Told:
     """Watch fault-free valves under another pattern of the CV than they were learned under."""
     rows = []
     for kind in ('small steps', 'slow ramps', 'full strokes', 'lower 40 %', 'upper 40 %'):
@@ -89,7 +88,7 @@ def patterns(runs: int) -> dict[str, Any]:
     return {'rows': rows}
 
 
-def day(hours: int) -> dict[str, Any]:
+def day(hours: int) -> Told:
     """One valve for a day without a fault, simulated and judged hour by hour."""
     from damadics_fd.core.approximator.estimator import Estimator
     from damadics_fd.core.decision.detector import Detector

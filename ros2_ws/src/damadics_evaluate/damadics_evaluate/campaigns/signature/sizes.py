@@ -4,7 +4,6 @@
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any
 
 import numpy as np
 from damadics_fd.core.monitor import run
@@ -22,13 +21,14 @@ from damadics_evaluate.campaigns.signature.valves import (
     quantiles,
     stiffened,
 )
+from damadics_evaluate.plain import Told
 
 
 def unchanged(fault: Fault) -> Build:
     return (fault,), {}
 
 
-def small(runs: int) -> dict[str, Any]:
+def small(runs: int) -> Told:
     """Small steps, mostly for the own alarm."""
     cases: list[tuple[str, str, str, float, Callable[[], Build]]] = []
     for change in (-1.0, -0.5, -0.3, 0.3, 0.5, 1.0, 3.0):
@@ -87,7 +87,7 @@ def small(runs: int) -> dict[str, Any]:
     return {'rows': rows}
 
 
-def strong(runs: int) -> dict[str, Any]:
+def strong(runs: int) -> Told:
     """Size of strong changes after short and long fault-free operation, VERIFY of 60 s."""
     cases: list[tuple[str, float, Callable[[float], Build]]] = [
         ('friction ramp to +20', 20.0, lambda t: ((Fault('f4', 1.0, t, 20.0),), {})),
@@ -127,7 +127,7 @@ def strong(runs: int) -> dict[str, Any]:
     return {'rows': rows}
 
 
-def drift(runs: int) -> dict[str, Any]:
+def drift(runs: int) -> Told:
     """Slow changes over an hour from 300 s on: change reached when they are found."""
     cases = [
         ('friction +1/h', 'f4', 0.05, 1.0, 1),

@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -18,6 +17,7 @@ from damadics_fd.commands.replay.flags import FlagWriter
 from damadics_fd.commands.replay.outcome import Outcome, collect
 from damadics_fd.core.monitor import Chain, monitor_for
 from damadics_fd.core.quality import EXPLANATIONS, REMEDIES
+from damadics_fd.core.record import Saved
 from damadics_fd.core.sample import SIGNALS
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.signature.state import STATE_VERIFY
@@ -47,10 +47,10 @@ class Plan:
     """
 
     mode: str = 'monitor'
-    settings: dict[str, Any] = field(default_factory=dict)
+    settings: Saved = field(default_factory=dict)
     figures: Path | None = None
     bags: Path | None = None
-    learned: dict[str, Any] | None = None
+    learned: Saved | None = None
 
     def monitor(self) -> Chain:
         """Return the monitor in its first state."""

@@ -11,8 +11,8 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, wait
 from dataclasses import replace
 from itertools import chain, count
+from multiprocessing.sharedctypes import Synchronized
 from pathlib import Path
-from typing import Any
 
 import yaml
 from tqdm import tqdm
@@ -32,6 +32,7 @@ from damadics_fd.commands.replay.output import (
 )
 from damadics_fd.core.estimating import estimator_for
 from damadics_fd.core.modes import MODES
+from damadics_fd.core.record import Saved
 from damadics_fd.core.settings import Settings, SettingsError
 from damadics_fd.core.settings.document import parameters_in
 from damadics_fd.ros.arguments import command_parser, split_ros_args
@@ -50,7 +51,7 @@ BESIDE = Path()  # bags with the flags go next to the inputs
 WARNINGS = 3  # shown per recording
 _SUFFIX = re.compile(r'(\.(mcap|db3)(\.zstd)?|\.csv|\.txt|\.tsv|\.parquet|\.pq)$', re.IGNORECASE)
 _UNSAFE = re.compile(r'[^\w. +#()@=-]')
-_counter: Any = None  # samples done by all workers
+_counter: 'Synchronized[int]'  # samples done by all workers
 
 
 def arguments(args: list[str] | None = None) -> argparse.Namespace:
@@ -129,13 +130,13 @@ def arguments(args: list[str] | None = None) -> argparse.Namespace:
     return options
 
 
-def settings_of(options: argparse.Namespace) -> dict[str, Any]:
+def settings_of(options: argparse.Namespace) -> Saved:
     """
     Return the settings that the user gave.
 
     :raises SettingsError: where they are wrong, all problems at once.
     """
-    values: dict[str, Any] = {}
+    values: Saved = {}
     if options.settings:
         values |= _parameters(options.settings)
     values |= settings_in(options.set)
@@ -144,7 +145,7 @@ def settings_of(options: argparse.Namespace) -> dict[str, Any]:
     return values
 
 
-def learned(options: argparse.Namespace, settings: dict[str, Any]) -> dict[str, Any] | None:
+def learned(options: argparse.Namespace, settings: Saved) -> Saved | None:
     """
     Read what the estimator begins with.
 
@@ -164,7 +165,7 @@ def learned(options: argparse.Namespace, settings: dict[str, Any]) -> dict[str, 
     return kept
 
 
-def _parameters(path: Path) -> dict[str, Any]:
+def _parameters(path: Path) -> Saved:
     """Read the settings out of a parameter file of the nodes."""
     try:
         content = yaml.safe_load(path.read_text(encoding='utf-8'))
@@ -294,7 +295,7 @@ def unique_stems(recordings: Sequence[Recording]) -> Iterator[str]:
         yield stem
 
 
-def _start(counter: Any, plan: Plan, workers: int) -> None:
+def _start(counter: 'Synchronized[int]', plan: Plan, workers: int) -> None:
     global _counter
     _counter = counter
     loading.THREADS = max(1, loading.THREADS // workers)  # the cores are busy

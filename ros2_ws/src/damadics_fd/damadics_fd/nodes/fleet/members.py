@@ -5,7 +5,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 import yaml
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from damadics_fd.core.bank import Bank
 from damadics_fd.core.decision.events import Event
-from damadics_fd.core.record import Ints
+from damadics_fd.core.record import Ints, Saved
 from damadics_fd.core.result import events_in
 from damadics_fd.core.settings import Settings, SettingsError
 from damadics_fd.core.settings.document import parameters_in
@@ -163,10 +163,10 @@ def members_of(valves: Sequence[Valve]) -> list[Member]:
 
 def _members(valves: Sequence[Valve], problems: list[str]) -> Iterator[Member]:
     known = {row['name'] for row in Settings.describe()}
-    files: dict[Path, dict[str, Any]] = {}
+    files: dict[Path, Saved] = {}
     for valve in valves:
         try:
-            given: dict[str, Any] = {}
+            given: Saved = {}
             if valve.parameters:
                 if valve.parameters not in files:
                     files[valve.parameters] = dict(_parameters(valve.parameters))
@@ -192,5 +192,5 @@ def _members(valves: Sequence[Valve], problems: list[str]) -> Iterator[Member]:
         )
 
 
-def _parameters(path: Path) -> dict[str, Any]:
+def _parameters(path: Path) -> Saved:
     return dict(parameters_in(yaml.safe_load(path.read_text(encoding='utf-8'))))
