@@ -16,6 +16,7 @@ from damadics_dashboard.pages.elements import box, tell, with_values
 
 BUCKETS = 300  # intervals across a plot: two points each at most
 BLOCK = NANO // 10  # of the signature: means over 0.1 s cancel 50 and 60 Hz hum
+EVERY = 5  # turns between two of a slow plot
 SMALLEST = 1e-5  # 1/s; a logarithmic axis has no zero
 
 Area: TypeAlias = list[dict[str, float]]  # {'xAxis': begin}, {'xAxis': end} [s]
@@ -246,10 +247,13 @@ class Feed:
 
     :param curves: the curves of each plot.
     :param window: time shown [s].
+    :param slow: plots of what changes slowly: fed every fifth time only.
     """
 
     curves: dict[int, list[Curve]]
     window: float = 60.0
+    slow: frozenset[int] = frozenset()
+    _turn: int = field(default=0, init=False)
     _end: int = field(default=-1, init=False)
 
     def restart(self) -> None:
@@ -270,6 +274,7 @@ class Feed:
         if end < self._end:
             self.restart()
         self._end = end
+        self._turn += 1
         width = int(self.window * NANO / BUCKETS)
         first = min(
             int(c.trace.rows['stamp'][0])
@@ -282,6 +287,8 @@ class Feed:
         message: dict[int, News] = {}
         for plot, curves in self.curves.items():
             everything = any(c.sent < begin for c in curves)
+            if plot in self.slow and self._turn % EVERY and not everything:
+                continue
             series, starts = [], []
             for curve in curves:
                 start = begin if everything else curve.sent

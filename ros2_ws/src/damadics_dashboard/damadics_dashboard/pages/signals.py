@@ -57,6 +57,11 @@ class Signals:
             cells.append((t(f'signal_{column}'), t.number(value, unit)))
         redraw(self._values, 'values.html', cells=cells)
 
+    @property
+    def slow(self) -> frozenset[int]:
+        """The plots of process values, which change slowly."""
+        return frozenset((self._pressures.id, self._flows.id))
+
     def _plot(self, curves: list[Curve], options: Options, colors: list[str], label: str) -> Plot:
         plot = Plot(options, colors, label, group=GROUP, empty=self._t('no_data_yet'))
         self.curves[plot.id] = curves
@@ -124,7 +129,7 @@ class Signals:
         with card(t('process_title'), t('process_remark')):
             self._values = markup('values.html', cells=[])
             columns = ('p1', 'p2', 'ps')
-            self._plot(
+            self._pressures = self._plot(
                 [Curve(trace, column, scale=BAR) for column in columns],
                 time_plot([t(f'signal_{column}') for column in columns], 'bar'),
                 ['--cv', '--x1', '--velocity'],
@@ -134,7 +139,7 @@ class Signals:
     def _flow(self) -> None:
         t = self._t
         with card(t('signal_flow')):
-            self._plot(
+            self._flows = self._plot(
                 [Curve(self._valve.traces['measurement'], 'flow')],
                 time_plot([t('signal_flow')], 'kg/s'),
                 ['--residual'],

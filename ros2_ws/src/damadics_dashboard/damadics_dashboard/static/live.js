@@ -33,7 +33,8 @@
       if (present === 'lost') say(words.lost);
     }
     // what the framework names in its own language, or not at all
-    if (words.language) document.documentElement.lang = words.language;
+    const root = document.documentElement;
+    if (words.language && root.lang !== words.language) root.lang = words.language;
     document.querySelectorAll('.q-uploader :is(a, input, button):not([aria-label])')
       .forEach((element) => {
         if (!element.querySelector('input')) {
@@ -52,7 +53,8 @@
         element.told = element.dataset.age;
         element.toldAt = now;
       }
-      const text = duration(Number(element.dataset.age) + (now - element.toldAt) / 1000);
+      const old = Number(element.dataset.age) + (now - element.toldAt) / 1000;
+      const text = old < 1 ? '< 1 s' : duration(old); // what stands still costs no frame
       if (element.textContent !== text) element.textContent = text;
     });
   }

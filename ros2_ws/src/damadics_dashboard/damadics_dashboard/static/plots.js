@@ -134,7 +134,7 @@
     new IntersectionObserver((seen) => {
       entry.hidden = !seen[seen.length - 1].isIntersecting;
       if (!entry.hidden && entry.late) { entry.late = false; draw(id); }
-    }, { rootMargin: '200px' }).observe(entry.chart.getDom());
+    }, { rootMargin: '50px' }).observe(entry.chart.getDom());
   }
 
   // The charts of a group show the same time: what one is zoomed to or points at, all are.
@@ -240,8 +240,18 @@
     register, push, whole, save, messages: 0, points: (id) => charts.get(id).data,
     shown: (id) => shown(charts.get(id)), clock,
   });
-  const restyle = () => charts.forEach((_, id) => { style(id); draw(id); });
-  const start = () => new MutationObserver(() => setTimeout(restyle, 30))
-    .observe(document.body, { attributes: true, attributeFilter: ['class'] });
+  // Only another theme is a reason: the class is also set again without a change, every second.
+  let theme = '';
+  const restyle = () => {
+    const present = css('--ink') + css('--card');
+    if (present === theme) return;
+    theme = present;
+    charts.forEach((_, id) => { style(id); draw(id); });
+  };
+  const start = () => {
+    theme = css('--ink') + css('--card');
+    new MutationObserver(() => setTimeout(restyle, 30))
+      .observe(document.body, { attributes: true, attributeFilter: ['class'] });
+  };
   if (document.body) start(); else document.addEventListener('DOMContentLoaded', start);
 })();
