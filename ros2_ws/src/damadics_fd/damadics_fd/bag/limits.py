@@ -35,9 +35,9 @@ class Limits:
     ratio: int = 1 << 17
     dense: int = 300
     total: int = 3 << 29
-    text: int = 1 << 26
+    text: int = 1 << 24
     channels: int = 10_000
-    attachments: int = 100_000
+    attachments: int = 20_000
     yaml: int = 1 << 20
     unpacked: int = 1 << 28
     unpacked_ratio: int = 300

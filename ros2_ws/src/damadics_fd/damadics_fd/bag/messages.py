@@ -243,6 +243,8 @@ class MessageFile(ABC):
 
         :raises BagError: where it is damaged or contradicts the first.
         """
+        if len(content) > self.limits.text:
+            raise BagError(f'a {op.name} record of {len(content)} bytes is beyond the limit')
         if op == Op.SCHEMA:
             schema = parse_schema(content)
             # the schema number zero means none, and is to be ignored

@@ -11,7 +11,7 @@ from damadics_fd.bag.limits import Limits
 from damadics_fd.bag.mcap.reader import McapFile
 from damadics_fd.bag.mcap.unpack import ZSTD_MAGIC
 from damadics_fd.bag.messages import MessageFile
-from damadics_fd.bag.sqlite import MAGIC, SqliteFile
+from damadics_fd.bag.sqlite.reader import MAGIC, SqliteFile
 
 
 def open_file(path: str | Path, tolerant: bool = False, limits: Limits = Limits()) -> MessageFile:

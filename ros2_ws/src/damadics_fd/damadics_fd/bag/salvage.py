@@ -14,7 +14,7 @@ from damadics_fd.bag.checking.inspection import LOSSY, UNUSABLE, WHOLE, Report
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.limits import Limits
 from damadics_fd.bag.mcap.reader import McapFile
-from damadics_fd.bag.mcap.records import Channel, Extent, Op, Schema, parse_attachment
+from damadics_fd.bag.mcap.records import HEAD, Channel, Extent, Op, Schema, parse_attachment
 from damadics_fd.bag.mcap.writer import McapWriter
 from damadics_fd.bag.messages import MESSAGE_HEAD, Batch, MessageFile
 from damadics_fd.bag.opening import open_file
@@ -200,7 +200,7 @@ class _Copy:
             if extent.name == ROSBAG2 and not self._whole:
                 continue  # its counts no longer hold
             described |= extent.name == ROSBAG2
-            self._writer.put_metadata(extent.name, mcap.read_bytes(extent.at, extent.length))
+            self._writer.put_metadata(extent.name, b''.join(_blocks(mcap, extent)))
         return described or (self._whole and not _describes(mcap))
 
 
@@ -210,7 +210,8 @@ def _describes(mcap: McapFile) -> bool:
 
 def _blocks(mcap: McapFile, extent: Extent) -> Iterator[bytes]:
     end = extent.at + extent.length
-    for at in range(extent.at, end, BLOCK):
+    yield HEAD.pack(extent.op, extent.length - HEAD.size)  # the one in the file may be damaged
+    for at in range(extent.at + HEAD.size, end, BLOCK):
         yield mcap.read_bytes(at, min(BLOCK, end - at))
 
 

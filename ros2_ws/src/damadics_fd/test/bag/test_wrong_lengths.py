@@ -40,6 +40,17 @@ def test_a_wrong_length_costs_nothing(op, wrong, tmp_path):
     assert (result.code, result.saved.code, result.saved.messages) == (LOSSY, WHOLE, CHUNKS * ROWS)
 
 
+@pytest.mark.parametrize('op', [Op.ATTACHMENT, Op.METADATA])
+def test_an_attachment_with_a_wrong_length_is_copied_with_the_right_one(op, tmp_path):
+    path = tmp_path / 'a.mcap'
+    whole = Maker({'chunk', 'statistics', 'crc', 'repeat'}, 'all').build()
+    path.write_bytes(whole)
+    (record,) = raw(path, op)
+    path.write_bytes(whole.replace(record, record[:1] + b'\xff' + record[2:]))
+    assert salvage(path, tmp_path / 'b.mcap').saved.code == WHOLE
+    assert raw(tmp_path / 'b.mcap', op) == [record]
+
+
 @pytest.mark.parametrize(
     ('op', 'text'), [(Op.METADATA, b'm\x08'), (Op.ATTACHMENT, b'data'), (Op.ATTACHMENT, b'n\x0a')]
 )

@@ -181,6 +181,8 @@ class McapFile(MessageFile):
         op = Op(op)
         if op == Op.CHUNK:
             return _Found(op, length, chunk=self._chunk(at, length, content))
+        if op in _PARSED and op != Op.MESSAGE and length > self.limits.text:
+            raise BagError(f'a {op.name} record of {length} bytes is beyond the limit')
         if op in _PARSED and length > BEGIN:
             content = self.read_bytes(at + HEAD.size, length)
         if not well_formed(op, content, length):

@@ -96,7 +96,7 @@ def read_summary(read: Read, size: int, limits: Limits) -> Summary:
         data = read(start, end - start + FOOTER_SIZE - 4)
         if crc32(data) == crc or (crc == 0 and start == stated):
             try:
-                summary = _parse(memoryview(data)[: end - start])
+                summary = _parse(memoryview(data)[: end - start], limits)
             except (BagError, ValueError):
                 return Summary()
             summary.present, summary.moved = True, start != stated
@@ -119,9 +119,9 @@ def _pairs(data: bytes) -> dict[int, int]:
     return dict(np.frombuffer(data, '<u2,<u8').tolist())
 
 
-def _parse(data: memoryview) -> Summary:
+def _parse(data: memoryview, limits: Limits) -> Summary:
     summary = Summary()
-    at = 0
+    at = text = 0
     while at < len(data):
         fields = Fields(data[at : at + HEAD.size])
         op, length = fields.unpack(HEAD)
@@ -129,6 +129,9 @@ def _parse(data: memoryview) -> Summary:
         if len(content) < length:
             raise BagError('the summary ends in the middle of a record')
         at += HEAD.size + length
+        text += length if op in (Op.SCHEMA, Op.CHANNEL) else 0
+        if text > limits.text:
+            raise BagError('the summary is beyond the limit')
         _note(summary, op, content)
     return summary
 

@@ -4,33 +4,27 @@
 
 import shutil
 import sqlite3
-import struct
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
-from itertools import chain
+from collections import Counter
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from damadics_fd.bag.cdr.definition import schema_text
-from damadics_fd.bag.compressed import is_compressed
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.limits import Limits
-from damadics_fd.bag.mcap.records import HEAD, Channel, Op, Schema, message_dtype
+from damadics_fd.bag.mcap.records import Channel, Schema
 from damadics_fd.bag.mcap.unpack import ZSTD_MAGIC, unpacked
-from damadics_fd.bag.messages import MESSAGE_HEAD, MessageFile
+from damadics_fd.bag.messages import MessageFile
+from damadics_fd.bag.sqlite.rows import Rows
 
 MAGIC = b'SQLite format 3\0'
-CHUNK = 1 << 20  # [B] of messages handled at a time
-MOST_ROWS = 20_000  # fetched at a time
-UNPACKED = 1 << 24  # [B] of compressed messages from which on they are handled
+BLOCK = 1 << 20  # [B] copied at a time
 STEPS = 1_000_000  # of the database between two looks at the budget
 STEPS_PER_BYTE = 200  # of the file, that any query may take
 BESIDE = ('-wal', '-journal')  # what a writer that did not end leaves beside the file
-Row = tuple[int, int, int, bytes]  # id, topic, time, data
-_HEAD = np.dtype([*list(message_dtype(0).descr[:-1])])
-_ROWS = 'SELECT rowid, topic_id, timestamp, data FROM messages WHERE rowid >= ? ORDER BY rowid'
 
 
 class SqliteFile(MessageFile):
@@ -99,7 +93,7 @@ class SqliteFile(MessageFile):
                 self._folder = tempfile.TemporaryDirectory()
                 target = Path(self._folder.name, 'bag.db3')
                 with unpacked(stream, self.path, self.limits) as plain, target.open('wb') as copy:
-                    shutil.copyfileobj(plain, copy, CHUNK)
+                    shutil.copyfileobj(plain, copy, BLOCK)
                 return target
         beside = [self.path.with_name(self.path.name + suffix) for suffix in BESIDE]
         beside = [file for file in beside if file.is_file() and file.stat().st_size]
@@ -183,107 +177,23 @@ class SqliteFile(MessageFile):
 
         :raises BagError: at damage, unless it is tolerated.
         """
+        rows = Rows(self._database, self._numbers, self._unpack, self.limits.chunk, self.problem)
+        counts: Counter[int] = Counter()
         following: int | None = -(2**63)
         while following is not None and not self._given_up:
             last = following
             try:
-                for rows in self._blocks(following):
-                    last = rows[-1][0]
-                    for part in self._parts(rows):
-                        data = self._encoded(part)
-                        if len(data):
-                            yield part[0][0], data
-                return
+                for block in rows.blocks(following):
+                    last = block.last
+                    counts.update(dict(enumerate(np.bincount(block.channels).tolist())))
+                    if len(block.records):
+                        yield block.first, block.records
+                break
             except sqlite3.Error as error:
                 self.problem(last, f'the database is damaged: {error}')
-                following = self._behind(last)
-
-    def _blocks(self, first: int) -> Iterator[list[Row]]:
-        cursor = self._database.execute(_ROWS, (first,))
-        count, total = 64, 0
-        while rows := cursor.fetchmany(count):
-            size = sum(len(row[3]) if isinstance(row[3], bytes) else 0 for row in rows)
-            total += size
-            yield rows
-            count = max(1, min(MOST_ROWS, CHUNK * len(rows) // max(size, 1)))
-
-    def _behind(self, last: int) -> int | None:
-        """Return the first id behind a damaged place, None where nothing can be read."""
-        low, step = max(last, 0), 1
-        while not self._readable(low + step):
-            low, step = low + step, 2 * step
-            if step > 1 << 40:
-                return None
-        high = low + step
-        while high - low > 1:
-            middle = (low + high) // 2
-            low, high = (low, middle) if self._readable(middle) else (middle, high)
-        return high
-
-    def _readable(self, first: int) -> bool:
-        try:
-            return self._database.execute(_ROWS + ' LIMIT 1', (first,)).fetchone() is not None
-        except sqlite3.Error:
-            return False
-
-    def _parts(self, rows: list[Row]) -> Iterator[list[Row]]:
-        """Part rows that get large when they are decompressed."""
-        if not any(isinstance(row[3], bytes) and is_compressed(row[3]) for row in rows):
-            yield rows
-            return
-        part: list[Row] = []
-        total = 0
-        for row in rows:
-            part.append(row)
-            try:
-                total += self._unpack.size(row[3])
-            except (BagError, TypeError):
-                continue  # told where it is decompressed
-            if total > UNPACKED:
-                yield part
-                part, total = [], 0
-        if part:
-            yield part
-
-    def _encoded(self, rows: Sequence[Row]) -> NDArray[np.uint8]:
-        """Return rows as Message records one after the other."""
-        _, topics, stamps, payloads = zip(*rows, strict=True)
-        try:
-            ids, times = np.array(topics, np.int64), np.array(stamps, np.int64)
-            data = [self._message(payload) for payload in payloads]
-            numbers = np.array([self._numbers[topic] for topic in ids.tolist()], np.uint16)
-        except (TypeError, ValueError, OverflowError, KeyError, BagError):
-            good = [row for row in rows if self._is_good(row)]
-            lost = len(rows) - len(good)
-            if not lost:
-                raise
-            self.problem(rows[0][0], f'{lost} rows are no messages of a topic')
-            return self._encoded(good) if good else np.empty(0, np.uint8)
-        sizes = np.fromiter(map(len, data), np.int64, len(data))
-        heads = np.zeros(len(data), _HEAD)
-        heads['op'], heads['length'] = Op.MESSAGE, sizes + (MESSAGE_HEAD - HEAD.size)
-        heads['channel'] = numbers
-        heads['log_time'] = heads['publish_time'] = times.view(np.uint64)
-        packed = heads.tobytes()
-        parts = (packed[at : at + MESSAGE_HEAD] for at in range(0, len(packed), MESSAGE_HEAD))
-        return np.frombuffer(
-            bytearray().join(chain.from_iterable(zip(parts, data, strict=True))), np.uint8
-        )
-
-    def _message(self, payload: bytes) -> bytes:
-        """Return a message, decompressed where the bag was compressed message by message."""
-        if not isinstance(payload, bytes):
-            raise TypeError
-        return self._unpack(payload)
-
-    def _is_good(self, row: Row) -> bool:
-        _, topic, stamp, payload = row
-        try:
-            struct.pack('<qq', topic, stamp)
-            self._message(payload)
-        except (TypeError, ValueError, struct.error, BagError):
-            return False
-        return topic in self._numbers
+                following = _behind(rows, last)
+        if not self.problems and self._counts is None:  # no need to ask for them
+            self._counts = {number: count for number, count in counts.items() if count}
 
     def check(self) -> None:
         """
@@ -297,6 +207,20 @@ class SqliteFile(MessageFile):
             found = (str(error),)
         if found and found[0] != 'ok':
             self.problem(0, f'the database is damaged: {found[0]}')
+
+
+def _behind(rows: Rows, last: int) -> int | None:
+    """Return the first id behind a damaged place, None where nothing can be read."""
+    low, step = max(last, 0), 1
+    while not rows.readable(low + step):
+        low, step = low + step, 2 * step
+        if step > 1 << 40:
+            return None
+    high = low + step
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (low, middle) if rows.readable(middle) else (middle, high)
+    return high
 
 
 def _installed(schema: Schema) -> Schema:
