@@ -7,11 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from damadics_fd.bag.cdr.definition import installed_type, schema_text
 from damadics_fd.bag.checking import inspection
 from damadics_fd.bag.checking.inspection import LOSSY, UNUSABLE, WHOLE, Report
 from damadics_fd.bag.errors import BagError
+from damadics_fd.bag.grouping import grouped
 from damadics_fd.bag.limits import Limits
 from damadics_fd.bag.mcap.reader import McapFile
 from damadics_fd.bag.mcap.records import HEAD, Channel, Extent, Op, Schema, parse_attachment
@@ -24,6 +26,7 @@ from damadics_fd.bag.writing.whole_writes import WholeWrites
 
 ROSBAG2 = 'rosbag2'  # name of the metadata that describes a bag
 MOST_NAMELESS = 16  # channels whose record is lost that are saved
+ROWS = 1 << 18  # messages in a chunk of the new file
 BLOCK = 1 << 22  # [B] of an attachment copied at a time
 
 
@@ -168,8 +171,10 @@ class _Copy:
 
     def _write(self, batch: Batch, written: BagFile) -> None:
         rows = np.flatnonzero(np.isin(batch.channels, list(self._declared)))
-        if not len(rows):
-            return
+        for first in range(0, len(rows), ROWS):
+            self._write_rows(batch, rows[first : first + ROWS], written)
+
+    def _write_rows(self, batch: Batch, rows: NDArray[np.int64], written: BagFile) -> None:
         log_times = batch.log_times(rows)
         begins = batch.starts[rows] - MESSAGE_HEAD
         ends = batch.starts[rows] + batch.sizes[rows]
@@ -182,11 +187,10 @@ class _Copy:
         offsets = np.cumsum(sizes) - sizes
         self._writer.add_records(data, batch.channels[rows], log_times.view(np.uint64), offsets)
         start, end = int(log_times.min()), int(log_times.max())
-        for number, part in batch.by_channel():
-            if number in self._declared:
-                known = self._file.channels.get(number)
-                topic = known.topic if known else f'/lost_channel_{number}'
-                written.note(topic, start, end, len(part))
+        for number, part in grouped(batch.channels[rows]):
+            known = self._file.channels.get(number)
+            topic = known.topic if known else f'/lost_channel_{number}'
+            written.note(topic, start, end, len(part))
 
     def _extras(self, mcap: McapFile) -> bool:
         """Copy attachments and metadata; tell whether one of them describes the bag."""

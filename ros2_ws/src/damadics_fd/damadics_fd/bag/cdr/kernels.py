@@ -149,9 +149,29 @@ def decode(
     return int(np.int64(n)) - first if at == stop else -1
 
 
+@jit
+def messages_end(words: Words, end: int) -> int:
+    """
+    Return where a run of whole Message records ends.
+
+    :param words: records, a message first.
+    :param end: their size [B].
+    """
+    at = 0
+    while at + HEAD <= end:
+        length = words.w8[at + 1]
+        if words.w1[at] != MESSAGE or length < np.uint64(BESIDES):
+            break
+        if length > np.uint64(end - at - HEAD):
+            break
+        at += HEAD + int(np.int64(length))
+    return at
+
+
 def warm_up() -> None:
     """Compile the loops, or load them from the cache."""
     data, none = words(np.zeros(SHORTEST, np.uint8)), np.empty(0, np.int64)
+    messages_end(data, 0)
     index(data, 0, np.empty(0, np.uint16), none, none, none)
     wide, values = np.empty(0, np.uint64), np.empty(0, np.uint32)
     decode(data, 0, 0, 0, wide, values, wide, wide, np.empty((1, 2), np.uint64), 0)

@@ -10,6 +10,7 @@ from typing import BinaryIO, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from damadics_fd.bag.cdr import kernels
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.limits import Limits
 from damadics_fd.bag.mcap.checks import check_extras, check_message_index
@@ -24,7 +25,6 @@ from damadics_fd.bag.mcap.records import (
     Op,
     parse_attachment,
     parse_metadata,
-    record,
 )
 from damadics_fd.bag.mcap.search import BEGIN, find_records, follows
 from damadics_fd.bag.mcap.summary import read_summary
@@ -38,7 +38,7 @@ KNOWN = 0x10  # opcodes from here on belong to later versions and other programs
 
 
 class _Found(NamedTuple):
-    """A record; `chunk` holds the records of a chunk, decompressed and checked."""
+    """A record; `chunk` holds those of a chunk, decompressed and checked, or a run of messages."""
 
     op: int
     length: int
@@ -100,25 +100,12 @@ class McapFile(MessageFile):
         """
         Yield the records of chunks in file order, each with the place of the chunk.
 
-        Messages outside of chunks are put together. The bytes are to be used until the next ones.
+        Messages outside of chunks come by the run. The bytes are to be used until the next ones.
 
         :raises BagError: at damage, unless it is tolerated.
         """
-        loose: list[bytes] = []
-        size = 0
         for at, found in self._records():
-            if found.op == Op.MESSAGE:
-                loose.append(record(found.op, found.content))
-                size += len(loose[-1])
-                if size < LOOSE:
-                    continue
-            if loose:
-                yield at, np.frombuffer(bytearray().join(loose), np.uint8)
-                loose, size = [], 0
-            if found.op == Op.CHUNK:
-                yield at, found.chunk
-        if loose:
-            yield self._size, np.frombuffer(bytearray().join(loose), np.uint8)
+            yield at, found.chunk
         self._check_end()
 
     def _records(self) -> Iterator[tuple[int, _Found]]:
@@ -152,6 +139,8 @@ class McapFile(MessageFile):
                 return
             if found.op < KNOWN or doubtful is None:
                 doubtful = at
+            if found.op == Op.MESSAGE:
+                found = self._run(at, found.length)
             if found.op in (Op.CHUNK, Op.MESSAGE):
                 yield at, found
                 doubtful = None
@@ -181,7 +170,7 @@ class McapFile(MessageFile):
         op = Op(op)
         if op == Op.CHUNK:
             return _Found(op, length, chunk=self._chunk(at, length, content))
-        if op in _PARSED and op != Op.MESSAGE and length > self.limits.text:
+        if op in _PARSED and length > self.limits.text:
             raise BagError(f'a {op.name} record of {length} bytes is beyond the limit')
         if op in _PARSED and length > BEGIN:
             content = self.read_bytes(at + HEAD.size, length)
@@ -194,6 +183,13 @@ class McapFile(MessageFile):
         elif op in (Op.METADATA, Op.ATTACHMENT):
             self._note_extra(op, at, length, content)
         return _Found(op, length, content)
+
+    def _run(self, at: int, length: int) -> _Found:
+        """Read messages outside of chunks that follow each other, the first of a given length."""
+        window = max(LOOSE, HEAD.size + length)
+        data = np.frombuffer(bytearray(self.read_bytes(at, window)), np.uint8)
+        end = kernels.messages_end(kernels.words(data), len(data))
+        return _Found(Op.MESSAGE, end - HEAD.size, chunk=data[:end])
 
     def _length(self, op: Op, at: int, stated: int, content: bytes) -> int:
         """Return the length of a record: by its fields, where other records follow these."""
@@ -303,4 +299,4 @@ class McapFile(MessageFile):
         return crc
 
 
-_PARSED = (Op.HEADER, Op.SCHEMA, Op.CHANNEL, Op.MESSAGE, Op.METADATA)
+_PARSED = (Op.HEADER, Op.SCHEMA, Op.CHANNEL, Op.METADATA)

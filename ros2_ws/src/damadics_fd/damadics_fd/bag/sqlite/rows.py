@@ -25,9 +25,10 @@ from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.mcap.records import Op
 from damadics_fd.bag.mcap.unpack import ZSTD_MAGIC
 
-CHUNK = 1 << 18  # [B] of messages handled at a time: they fit the cache
+CHUNK = 1 << 19  # [B] of messages handled at a time: they fit the cache
 MOST_ROWS = 20_000  # handled at a time
 MOST_JOINED = 1 << 24  # [B] of messages that the database may join
+GREATEST = (1 << 63) - 1  # id of a row
 UNPACKED = 1 << 24  # [B] of compressed messages from which on they are handled
 Row = tuple[int, int, int, bytes]  # id, topic, time, data
 _ROWS = (
@@ -35,10 +36,9 @@ _ROWS = (
 )
 # one value for many rows; between their data stands the room for the head of a record
 _JOINED = (
-    "SELECT max(n), CAST(group_concat(data, ?) AS BLOB), group_concat(timestamp, ' '),"
-    " group_concat(topic_id, ' '), group_concat(length(data), ' ') FROM"
-    ' (SELECT rowid AS n, topic_id, timestamp, data FROM messages WHERE rowid >= ?'
-    ' ORDER BY rowid LIMIT ?)'
+    "SELECT CAST(group_concat(data, ?) AS BLOB), group_concat(timestamp, ' '),"
+    " group_concat(topic_id, ' '), group_concat(length(data), ' ')"
+    ' FROM messages WHERE rowid BETWEEN ? AND ?'
 )
 _ZSTD = int.from_bytes(ZSTD_MAGIC, 'little')
 
@@ -82,18 +82,21 @@ class Rows:
     ):
         self._database, self._numbers, self._unpack = database, numbers, unpack
         self._longest, self._tell = longest, tell
+        self._buffer = np.empty(0, np.uint8)  # used again: it need not be mapped again
         self._channel_of = np.array(sorted(numbers.items()), np.int64).reshape(-1, 2)
+        (last,) = database.execute('SELECT max(rowid) FROM messages').fetchone()
+        self._last: int = last if isinstance(last, int) else 0
         (encoding,) = database.execute('PRAGMA encoding').fetchone()
         self._joins = encoding == 'UTF-8'  # others would be translated
 
     def blocks(self, first: int) -> Iterator[Block]:
         """
-        Yield messages block by block from a row id on.
+        Yield messages block by block from a row id on; each is to be used until the next.
 
         :raises sqlite3.Error: where the database is damaged.
         """
         count = 1
-        while True:
+        while first <= GREATEST:
             size = rows = 0
             try:
                 for block in self._read(first, count):
@@ -105,7 +108,7 @@ class Rows:
                     raise
                 count = max(1, count // 8)  # up to the damaged row
                 continue
-            if rows < count:
+            if not rows:
                 return
             count = max(1, min(MOST_ROWS, 8 * count, CHUNK * rows // max(size, 1)))
 
@@ -126,17 +129,18 @@ class Rows:
 
     def _joined(self, first: int, count: int) -> Block | None:
         """Let the database put rows together; None where one of them is out of the ordinary."""
-        if not self._joins or count == 1:
+        last = min(first + count - 1, self._last)
+        if not self._joins or last <= first:
             return None
         self._database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MOST_JOINED)
         try:
-            parameters = (bytes(BODY_AT), first, count)
-            last, data, *texts = self._database.execute(_JOINED, parameters).fetchone()
+            parameters = (bytes(BODY_AT), first, last)
+            data, *texts = self._database.execute(_JOINED, parameters).fetchone()
         except sqlite3.Error:
             return None
         finally:
             self._database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, self._longest)
-        if last is None:
+        if data is None:
             return None
         try:
             with warnings.catch_warnings(action='error'):
@@ -152,7 +156,9 @@ class Rows:
         found = self._channel_of[np.minimum(places, len(self._channel_of) - 1)]
         if (found[:, 0] != topics).any():
             return None
-        buffer = np.empty(ends[-1] + SHORTEST, np.uint8)
+        if len(self._buffer) < ends[-1] + SHORTEST:
+            self._buffer = np.empty(2 * ends[-1] + SHORTEST, np.uint8)
+        buffer = self._buffer[: ends[-1] + SHORTEST]
         buffer[BODY_AT : ends[-1]] = np.frombuffer(data, np.uint8)
         bodies = ends - sizes
         view = words(buffer)
