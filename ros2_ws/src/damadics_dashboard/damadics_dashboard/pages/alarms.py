@@ -14,8 +14,8 @@ from damadics_dashboard.live.watcher import Watcher
 from damadics_dashboard.pages.actions import alarm_buttons
 from damadics_dashboard.pages.elements import box, markup, redraw, tell
 from damadics_dashboard.pages.frame import may_operate
-from damadics_dashboard.pages.valve_words import AlarmWords, alarm_kind, alarm_words
 from damadics_dashboard.words.texts import Texts
+from damadics_dashboard.words.valve_words import AlarmWords, alarm_kind, alarm_words
 
 MOST = 50  # alarms that are listed; the tiles show all
 Key = tuple[str, int]

@@ -13,8 +13,8 @@ from damadics_dashboard.live.watcher import Watcher
 from damadics_dashboard.pages.alarms import AlarmList
 from damadics_dashboard.pages.elements import markup, tell
 from damadics_dashboard.pages.frame import card, frame
-from damadics_dashboard.pages.valve_words import address, area_of, detail_of, headline, of_limit
 from damadics_dashboard.words.texts import Texts
+from damadics_dashboard.words.valve_words import address, area_of, detail_of, headline, of_limit
 
 PERIOD = 0.2  # s
 LARGE = 100  # valves from which on the page is drawn twice a second

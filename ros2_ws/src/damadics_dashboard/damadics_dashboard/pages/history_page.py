@@ -12,11 +12,11 @@ from nicegui import ui
 from damadics_dashboard.live.watcher import Watcher
 from damadics_dashboard.pages.elements import box, button, markup, redraw, with_values
 from damadics_dashboard.pages.frame import card, frame, grant, keep_user, may_operate, user_name
-from damadics_dashboard.pages.valve_words import TRANSITIONS, address, history_rows
 from damadics_dashboard.store.export import cell
 from damadics_dashboard.store.history import ACTION_COLUMNS, COLUMNS, Wanted
 from damadics_dashboard.store.rows import ActionRow
 from damadics_dashboard.words.texts import Texts
+from damadics_dashboard.words.valve_words import TRANSITIONS, address, history_rows
 
 DAYS = {0: 'all_time', 1: 'last_day', 7: 'last_week', 30: 'last_month', 365: 'last_year'}
 PAGE = 100  # rows

@@ -16,9 +16,9 @@ from damadics_dashboard.live.watcher import Watcher
 from damadics_dashboard.pages.elements import box, markup, tell, with_values
 from damadics_dashboard.pages.frame import card, frame
 from damadics_dashboard.pages.plots import News, Options, Plot, signature_plot, time_plot
-from damadics_dashboard.pages.valve_words import cause_of, history_rows
 from damadics_dashboard.server.limits import LARGEST_UPLOAD
 from damadics_dashboard.words.texts import Texts
+from damadics_dashboard.words.valve_words import cause_of, history_rows
 
 if TYPE_CHECKING:
     from damadics_dashboard.pages.playback import Given, Playback

@@ -21,13 +21,13 @@ from damadics_dashboard.pages.report_button import report_button
 from damadics_dashboard.pages.signals import Signals
 from damadics_dashboard.pages.simulator import simulator_panel
 from damadics_dashboard.pages.trend_card import TrendCard
-from damadics_dashboard.pages.valve_words import (
+from damadics_dashboard.words.texts import Texts
+from damadics_dashboard.words.valve_words import (
     detail_of,
     headline,
     history_rows,
     of_limit,
 )
-from damadics_dashboard.words.texts import Texts
 
 PERIOD = 0.2  # s
 SIGNATURE_NOW = 30.0  # s

@@ -9,11 +9,11 @@ from dataclasses import dataclass, field
 from damadics_fd.store.intervals import TRENDED, Intervals, Series
 from damadics_msgs.msg import FaultEvent
 
-from damadics_dashboard.pages.valve_words import TRANSITIONS, found_by, headline, of_limit
 from damadics_dashboard.store.history import History, Wanted
 from damadics_dashboard.store.rows import ActionRow, EventRow
 from damadics_dashboard.words.outlook import outlook_words, value_words
 from damadics_dashboard.words.texts import Texts
+from damadics_dashboard.words.valve_words import TRANSITIONS, found_by, headline, of_limit
 
 DAY = 86400.0
 MOST_EVENTS = 5000

@@ -12,12 +12,13 @@ from damadics_fd.core.identified import FaultFree
 from damadics_fd.core.monitor import run
 from damadics_fd.core.settings import Settings
 
+from . import courses, kinds
 from . import valve as foreign
 from .trial import commissioned, trial
 
 
 def balance(build, seed, minutes=10.0, spoil=None):
-    columns = foreign.simulate(build, foreign.steps(60.0 * minutes, seed), seed=seed)
+    columns = foreign.simulate(build, courses.steps(60.0 * minutes, seed), seed=seed)
     if spoil:
         columns = spoil(columns)
     sheet = Settings.for_mode('monitor', **foreign.sheet(build))
@@ -28,7 +29,7 @@ def balance(build, seed, minutes=10.0, spoil=None):
 @pytest.mark.parametrize('flow', ['open', 'close'])
 def test_action_and_direction_of_flow_are_found(air, flow):
     low = {'p1': 1.2e6, 'p2': 0.9e6} if air == flow else {}  # more could not be moved
-    build = foreign.random_valve(21, air_to=air, flow_to=flow, **low)
+    build = kinds.random_valve(21, air_to=air, flow_to=flow, **low)
     b = balance(build, 21)
     assert (b.settings.air_to, b.settings.flow_to) == (air, flow)
     assert b.undetermined == ()
@@ -39,7 +40,7 @@ def test_action_and_direction_of_flow_are_found(air, flow):
 
 @pytest.mark.parametrize('lag', [0.05, 0.1, 0.2])
 def test_the_lag_of_the_pressure_is_found(lag):
-    build = foreign.random_valve(22, ps_lag=lag)
+    build = kinds.random_valve(22, ps_lag=lag)
     b = balance(build, 22)
     assert b.settings.ps_lag == pytest.approx(lag, abs=0.015)
     assert b.settings.stiffness == pytest.approx(build.stiffness, rel=0.03)
@@ -47,7 +48,7 @@ def test_the_lag_of_the_pressure_is_found(lag):
 
 @pytest.mark.parametrize('wrong', [{'plug_gain': 1.2}, {'plug_shape': 0.1}, {'plug_gain': 0.15}])
 def test_the_plug_force_is_found(wrong):
-    build = foreign.random_valve(23, **wrong)
+    build = kinds.random_valve(23, **wrong)
     s = balance(build, 23).settings
     shape = 1 + build.plug_shape * np.sin(2 * np.pi * foreign.NODES + 0.7)
     true = foreign.SHEET_KM / (build.plug_gain * shape)
@@ -64,7 +65,7 @@ def test_five_percent_of_missing_or_doubled_samples_do_not_matter():
         columns['stamp'][late] = columns['stamp'][late - 1]
         return columns
 
-    build = foreign.random_valve(24)
+    build = kinds.random_valve(24)
     b = balance(build, 24, spoil=spoil)
     assert b.settings.stiffness == pytest.approx(build.stiffness, rel=0.03)
 
@@ -75,7 +76,7 @@ def test_five_percent_of_missing_or_doubled_samples_do_not_matter():
     ids=['wrong plug shape', 'air and flow the other way', 'lag'],
 )
 def test_a_foreign_valve_is_watched_without_alarm_and_its_fault_named(change):
-    build = foreign.random_valve(25, **change)
+    build = kinds.random_valve(25, **change)
     proposal = commissioned(build, 25)
     assert proposal.verdict == 'ok', proposal.limiting
     for fault in ('friction +100 %', 'spring -20 %'):
@@ -90,8 +91,8 @@ def test_a_foreign_valve_is_watched_without_alarm_and_its_fault_named(change):
 
 @pytest.mark.parametrize('wrong', ['stroke', 'stiffness', 'area', 'everything'])
 def test_constants_of_another_valve_never_arm(wrong):
-    build = foreign.CATALOGUE['G100' if wrong == 'everything' else 'G38']
-    columns = foreign.simulate(build, foreign.steps(400.0, 31), seed=31)
+    build = kinds.CATALOGUE['G100' if wrong == 'everything' else 'G38']
+    columns = foreign.simulate(build, courses.steps(400.0, 31), seed=31)
     right = {'stroke': 0.0381, 'stiffness': 61e3, 'area': 0.029, 'alpha4': 20333.0}
     given = {} if wrong == 'everything' else {wrong: 1.6 * right[wrong]}
     result = run(columns, Settings.for_mode('monitor', **given))
@@ -101,25 +102,23 @@ def test_constants_of_another_valve_never_arm(wrong):
 
 
 def test_a_standing_fault_is_one_occurrence():
-    build = foreign.random_valve(26)
+    build = kinds.random_valve(26)
     proposal = commissioned(build, 26)
     for fault in ('friction +300 %', 'spring -20 %'):
         t = trial(build, proposal, fault, 26, quiet=300.0, after=1500.0)
         assert (t.false_alarms, t.occurrences) == (0, 1)
-    loop = foreign.control(1800.0, 26)
+    loop = courses.control(1800.0, 26)
     t = trial(build, proposal, 'friction +300 %', 26, quiet=300.0, after=1500.0, cv=loop)
     assert t.occurrences <= 1
 
 
 def test_a_twin_has_what_was_found(tmp_path):
-    build = foreign.random_valve(27)
+    build = kinds.random_valve(27)
     proposal = commissioned(build, 27, minutes=10.0)
     constants = twin(proposal)
     assert constants['stiffness'] == pytest.approx(build.stiffness, rel=0.03)
     assert constants['static'] >= constants['coulomb'] > 0.0
     assert 0.0 < constants['lag'] < 1.0
-    other = commissioned(
-        foreign.random_valve(27, air_to='open', flow_to='close'), 27, minutes=10.0
-    )
+    other = commissioned(kinds.random_valve(27, air_to='open', flow_to='close'), 27, minutes=10.0)
     with pytest.raises(CommissioningError, match='air to open'):
         twin(other)

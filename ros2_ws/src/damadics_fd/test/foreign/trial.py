@@ -12,6 +12,7 @@ from damadics_fd.core.monitor import run
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.signature.signature import Signature
 
+from . import courses
 from . import valve as foreign
 
 FAULTS = {
@@ -43,7 +44,7 @@ class Trial:
 
 def commissioned(valve, seed, minutes=20.0, course=None, spoil=None, **given):
     """Return what commission proposes for a valve from strokes."""
-    cv = foreign.steps(60.0 * minutes, seed)
+    cv = courses.steps(60.0 * minutes, seed)
     columns = foreign.simulate(valve, cv, course, seed=seed)
     if spoil:
         columns = spoil(columns, seed)
@@ -56,7 +57,7 @@ def trial(
 ):
     """Run a valve fault-free, then with a fault as a step."""
     c = replace(course or foreign.Course(), fault_at=quiet, **FAULTS.get(fault, {}))
-    command = foreign.steps(quiet + after, seed + 1000) if cv is None else cv
+    command = courses.steps(quiet + after, seed + 1000) if cv is None else cv
     columns = foreign.simulate(valve, command, c, seed=seed + 1000)
     if spoil:
         columns = spoil(columns, seed)

@@ -8,7 +8,7 @@ subsonic flow after ISO 6358, isothermal chamber, four positioners, either actio
 direction of flow, a plug force table that is not the data sheet's, transmitters with lags.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numba
 import numpy as np
@@ -80,103 +80,6 @@ class Course:
     p1_swing: float = 0.0  # Pa
     p1_period: float = 14400.0
     day: float = 86400.0
-
-
-CATALOGUE = {
-    'G20': Valve(
-        stroke=0.02,
-        area=0.012,
-        stiffness=60e3,
-        mass=2.0,
-        dead_volume=1.5e-3,
-        plug_diameter=0.03,
-        orifice=0.9e-9,
-    ),
-    'G38': Valve(),
-    'G50': Valve(
-        stroke=0.05,
-        area=0.035,
-        stiffness=90e3,
-        mass=6.0,
-        dead_volume=6e-3,
-        dry=0.05,
-        plug_diameter=0.06,
-        orifice=3.2e-9,
-    ),
-    'G60': Valve(
-        stroke=0.06,
-        area=0.06,
-        stiffness=110e3,
-        mass=9.0,
-        dead_volume=9e-3,
-        plug_diameter=0.08,
-        orifice=5e-9,
-    ),
-    'G100': Valve(
-        stroke=0.1,
-        area=0.09,
-        stiffness=160e3,
-        mass=16.0,
-        dead_volume=18e-3,
-        dry=0.02,
-        plug_diameter=0.1,
-        orifice=1.2e-8,
-    ),
-}
-
-
-def random_valve(seed, **changes):
-    """Return a valve of the catalogue with scattered build and a positioner."""
-    rng = np.random.default_rng([seed, 17])
-    name = list(CATALOGUE)[int(rng.integers(len(CATALOGUE)))]
-    base = CATALOGUE[name]
-    scattered = replace(
-        base,
-        stiffness=base.stiffness * (1 + rng.uniform(-0.04, 0.04)),
-        preload=base.preload * (1 + rng.uniform(-0.15, 0.15)),
-        dry=base.dry * rng.uniform(0.8, 1.25),
-        static=rng.uniform(1.1, 1.6),
-        viscous=base.viscous * rng.uniform(0.7, 1.4),
-        positioner=POSITIONERS[int(rng.integers(4))],
-        p1=base.p1 * rng.uniform(0.95, 1.05),
-    )
-    return replace(scattered, **changes)
-
-
-def steps(seconds, seed, low=0.0, high=1.0, least=4.0, most=14.0, period=0.005):
-    """Return a command of random steps."""
-    rng = np.random.default_rng([seed, 3])
-    u, n = np.empty(round(seconds / period)), 0
-    while n < len(u):
-        m = n + round(rng.uniform(least, most) / period)
-        u[n:m] = rng.uniform(low, high)
-        n = m
-    return u
-
-
-def control(seconds, seed, centre=0.5, amplitude=0.01, period=0.005):
-    """Return the command of a loop at work: small wandering steps each second."""
-    rng = np.random.default_rng([seed, 5])
-    m = int(seconds) + 2
-    walk = np.zeros(m)
-    for i in range(1, m):
-        walk[i] = 0.9 * walk[i - 1] + rng.standard_normal() * amplitude
-    return np.repeat(np.clip(centre + walk, 0.02, 0.98), round(1 / period))[
-        : round(seconds / period)
-    ]
-
-
-def batch(seconds, seed, rest=300.0, period=0.005):
-    """Return a command of full strokes with long rests between."""
-    rng = np.random.default_rng([seed, 7])
-    u, n, level = np.empty(round(seconds / period)), 0, 0.1
-    while n < len(u):
-        level = 0.9 - level if rng.random() < 0.8 else rng.uniform(0.1, 0.9)
-        level = min(max(level, 0.1), 0.9)
-        m = n + round(rng.uniform(0.5, 1.5) * rest / period)
-        u[n:m] = level
-        n = m
-    return u
 
 
 @numba.njit(cache=True)

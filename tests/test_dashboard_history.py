@@ -1,0 +1,128 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""The history of the page: kept over restarts, damage and a locked file."""
+
+import sqlite3
+
+import pytest
+from damadics_dashboard.store.history import History, Wanted
+from damadics_fd.store.access import Access, Grant, Role
+from damadics_msgs.msg import FaultEvent
+
+TOKEN = '0123456789abcdef'
+OPERATOR = Access([Grant(Role.OPERATOR, TOKEN)])
+
+
+def event(transition: int, text: str = 'raised', occurrence: int = 1, stamp: int = 5) -> dict:
+    return {
+        'valve': 'lv101',
+        'stamp': stamp,
+        'transition': transition,
+        'occurrence': occurrence,
+        'level': 4,
+        'onset': 4,
+        'residual': 0.4,
+        'threshold': 0.2,
+        'ratio': 2.0,
+        'duration': 1.0,
+        'cause': 'friction',
+        'confidence': None,
+        'strength': 0.5,
+        'text': text,
+        'advice': 'look',
+    }
+
+
+def test_history_survives_and_takes_a_repeated_event_once(tmp_path):
+    path = tmp_path / 'state' / 'history.sqlite'
+    first = History(path)
+    assert first.add(event(FaultEvent.RAISED))
+    assert first.add(event(FaultEvent.CLEARED, 'cleared'))
+    first.close()
+    second = History(path)
+    assert not second.add(event(FaultEvent.RAISED)), 'the detector repeats it to a newcomer'
+    assert second.add(event(FaultEvent.RAISED)), 'the same run again is another event'
+    assert [row['transition'] for row in second.latest()] == [0, 1, 0]
+    assert second.valves() == ['lv101']
+    second.close()
+
+
+def test_history_finds_by_word_valve_kind_and_time(tmp_path):
+    history = History(tmp_path / 'history.sqlite')
+    for n in range(5):
+        history.add({**event(FaultEvent.RAISED, f'raised {n} 50%', stamp=n), 'valve': f'v{n}'})
+    history.add(event(FaultEvent.CLEARED, 'cleared'))
+    found = [row['text'] for row in history.find(Wanted(text='raised 3'))]
+    assert found == ['raised 3 50%']
+    assert len(history.find(Wanted(text='50%'))) == 5 and not history.find(Wanted(text='5_%'))
+    assert len(history.find(Wanted(valve='v1'))) == 1
+    assert len(history.find(Wanted(transitions=(FaultEvent.CLEARED,)))) == 1
+    assert not history.find(Wanted(until=1.0))
+    assert len(history.find(Wanted(), 2, 4)) == 2
+    history.close()
+
+
+def test_what_people_did_is_kept_once_though_page_and_node_tell_it(tmp_path):
+    history = History(tmp_path / 'history.sqlite')
+    action = {'valve': 'v', 'action': 'reset', 'user': 'Anna', 'role': 'operator'}
+    action |= {'comment': 'packing', 'done': 1, 'result': 'reset'}
+    assert history.add_action(action)
+    assert not history.add_action({**action, 'role': ''}), 'the node says it again'
+    assert [row['user'] for row in history.actions()] == ['Anna']
+    history.close()
+
+
+def test_a_locked_history_waits_in_memory_and_is_written_later(tmp_path):
+    path = tmp_path / 'history.sqlite'
+    history = History(path)
+    holder = sqlite3.connect(path)
+    holder.execute('BEGIN IMMEDIATE')
+    assert history.add(event(FaultEvent.RAISED))
+    assert 'tried again' in history.problem
+    holder.rollback()
+    history.retry()
+    assert history.problem == '' and len(history.latest()) == 1
+    history.close()
+
+
+@pytest.mark.parametrize('content', [b'garbage' * 99, b'SQLite format 3\0' + bytes(5000), None])
+def test_a_damaged_history_is_moved_aside_and_begun_anew(tmp_path, content):
+    path = tmp_path / 'history.sqlite'
+    if content is None:
+        path.mkdir()
+    else:
+        path.write_bytes(content)
+    history = History(path)
+    assert 'the file of before is' in history.problem
+    assert history.add(event(FaultEvent.RAISED)) and len(history.latest()) == 1
+    assert len(list(tmp_path.glob('history.sqlite.bad-*'))) == 1
+    history.close()
+
+
+def test_a_history_whose_description_is_no_text_is_moved_aside_each_time_under_a_name(tmp_path):
+    path = tmp_path / 'history.sqlite'
+    for _ in range(2):  # in one second
+        History(path).close()
+        whole = path.read_bytes()
+        path.write_bytes(whole.replace(b'CREATE TABLE event', b'CREATE TABLE \xff\xae\xffnt'))
+        for journal in tmp_path.glob('*-*l'):
+            journal.unlink()
+        History(path).close()
+    assert len(list(tmp_path.glob('history.sqlite.bad-*'))) == 2
+
+
+def test_damaged_rows_of_a_history_are_left_out_and_told(tmp_path):
+    path = tmp_path / 'history.sqlite'
+    history = History(path)
+    history.add(event(FaultEvent.RAISED, 'whole'))
+    history.add(event(FaultEvent.RAISED, 'text'))
+    history.add(event(FaultEvent.RAISED, 'stamp'))
+    history.close()
+    with sqlite3.connect(path) as file:
+        file.execute("UPDATE event SET valve = CAST(x'50ff45' AS TEXT) WHERE text = 'text'")
+        file.execute("UPDATE event SET stamp = 'yesterday' WHERE text = 'stamp'")
+    history = History(path)
+    assert [row['text'] for row in history.latest()] == ['text', 'whole']
+    assert 'P\ufffdE' in history.valves()
+    assert 'left out' in history.problem
+    history.close()
