@@ -3,12 +3,14 @@
 """Who is let in to the page, and what it takes from whom."""
 
 import asyncio
+import logging
 import re
 
 import pytest
 from damadics_dashboard.dashboard import main, read_tokens
 from damadics_dashboard.server.access import COOKIE, Guard, check_binding
 from damadics_dashboard.server.limits import SizeLimit
+from damadics_dashboard.server.log import keep_short
 from damadics_fd.store.access import Access, AccessError, Grant, Role
 
 TOKEN = '0123456789abcdef'
@@ -156,3 +158,13 @@ def test_what_is_too_large_is_answered_with_413_before_it_is_taken():
     assert status == [413, 413, 413]
     assert send(limit, '/x', body=[b'a' * 60, b'b' * 40])[0]['status'] == 200
     assert send(limit, '/_nicegui/client/1', body=[b'a' * 999])[0]['status'] == 200
+
+
+def test_what_a_visitor_sends_is_a_line_of_the_log(caplog):
+    keep_short()
+    try:
+        raise ValueError('unexpected end\nof data')
+    except ValueError:
+        logging.getLogger('engineio.server').exception('message async handler error')
+    assert caplog.messages == ['a malformed message was refused: ValueError: unexpected end']
+    assert 'Traceback' not in caplog.text

@@ -17,8 +17,10 @@ from damadics_msgs.msg import (
     FaultEvent,
     FaultFlag,
     FleetEvent,
+    FleetIsolation,
     FleetLayout,
     FleetStatus,
+    Float64Stamped,
     Measurement,
     MeasurementBlock,
 )
@@ -91,13 +93,13 @@ class Sender:
             self.peer.wait(lambda: False, INSTANTS * PERIOD * 1e-9)
         return bool(condition())
 
-    def events_of_a_single_monitor(self) -> list:
+    def single_monitor(self):
         stamps, x1 = zip(*self.faulty, strict=True)
         columns = {name: np.full(len(x1), np.nan) for name in SIGNALS}
         columns |= {signal: np.full(len(x1), value) for signal, value in REST.items()}
         columns['x1'] = np.array(x1)
         chain = Chain(Settings.from_mapping(PAPER))
-        return chain.run({'stamp': np.array(stamps), **columns}).events
+        return chain.run({'stamp': np.array(stamps), **columns})
 
 
 class Heard:
@@ -140,6 +142,8 @@ def test_fifty_valves_in_one_process(processes, peer, tmp_path):
         *('--ros-args', '-p', f'expose:={EXPOSED}', '-p', f'alarm_folder:={tmp_path / "alarms"}'),
     ]
     flags = peer.listen(FaultFlag, f'/{name(FAULTY)}/fault_flag', qos.FLAG)
+    residuals = peer.listen(Float64Stamped, f'/{name(FAULTY)}/residual', qos.SAMPLES)
+    causes = peer.listen(FleetIsolation, 'fleet/isolation', qos.EVENTS)
     own_events = peer.listen(FaultEvent, f'/{name(FAULTY)}/fault_event', qos.EVENTS)
     other_flags = peer.listen(FaultFlag, f'/{name(OTHER)}/fault_flag', qos.FLAG)
     sender = Sender(peer)
@@ -162,7 +166,8 @@ def test_fifty_valves_in_one_process(processes, peer, tmp_path):
     assert fleet.state(LEARNING) == FaultFlag.STATE_LEARNING
     assert fleet.state(OTHER) == FaultFlag.STATE_NOT_MONITORING
     assert {event.valve for event in fleet.events} == {f'/{name(FAULTY)}'}
-    alone = sender.events_of_a_single_monitor()
+    result = sender.single_monitor()
+    alone = result.events
     told = [m.event for m in fleet.events]
     assert [m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for m in told] == [
         event.stamp for event in alone
@@ -171,6 +176,16 @@ def test_fifty_valves_in_one_process(processes, peer, tmp_path):
     assert str(own_events) == str(told)  # NaN is not equal to itself
     assert flags[-1].state == FaultFlag.STATE_LATCHED
     assert flags[-1].occurrence == 1
+    assert {(one.valve, one.isolation.occurrence) for one in causes} == {(f'/{name(FAULTY)}', 1)}
+    assert causes[0].isolation.found_by == 'threshold'
+    assert causes[0].isolation.text == told[0].text
+
+    # whoever listens to an exposed valve hears every sample
+    assert len(residuals) > INSTANTS
+    heard = [m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for m in residuals]
+    assert set(np.diff(heard)) == {PERIOD}
+    rows = np.searchsorted(result.decisions['stamp'], heard)
+    assert [m.data for m in residuals] == result.decisions['residual'][rows].tolist()
 
     # a valve may send its own measurement
     for n in range(1, 20):

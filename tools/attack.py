@@ -309,6 +309,15 @@ def attack_signals(prey: Prey, count: int) -> None:
         prey.found['false healthy'] += 1
 
 
+def tracebacks(folder: Path) -> int:
+    """Print the tracebacks in the logs; return how many there are."""
+    texts = [file.read_text(errors='replace') for file in folder.glob('*.log')]
+    found = [part for text in texts for part in text.split('Traceback')[1:]]
+    for part in found[:3]:
+        print('Traceback' + part[-1500:], flush=True)
+    return len(found)
+
+
 def main() -> int:
     """
     Run the attack.
@@ -338,10 +347,7 @@ def main() -> int:
         finally:
             for process in prey.processes.values():
                 process.kill()
-            traces = sum(
-                file.read_text(errors='replace').count('Traceback')
-                for file in prey.folder.glob('*.log')
-            )
+            traces = tracebacks(prey.folder)
             rclpy.try_shutdown()
     prey.found['tracebacks in the logs'] = traces
     for what, number in sorted(prey.found.items()):

@@ -141,8 +141,10 @@ def serve(options: argparse.Namespace, access: Access, ros_args: list[str]) -> i
     from damadics_dashboard.pages.frame import FAVICON
     from damadics_dashboard.pages.routes import add_routes
     from damadics_dashboard.server.limits import PatientProtocol, SizeLimit
+    from damadics_dashboard.server.log import keep_short
     from damadics_dashboard.store.history import History
 
+    keep_short()
     history = History(options.state / 'history.sqlite')
     trends = TrendPoints(Intervals(options.state / 'trends.sqlite'), options.signatures)
     watcher = Watcher(history, trends, options.follow, ros_args)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from damadics_msgs.msg import Estimate as EstimateMessage
-from damadics_msgs.msg import FaultEvent, FaultFlag, Float64Stamped
+from damadics_msgs.msg import FaultEvent, FaultFlag, Float64Stamped, Isolation
 
 from damadics_fd.causes import explain
 from damadics_fd.core.approximator.state import Estimate
@@ -24,7 +24,7 @@ from damadics_fd.nodes.second_publisher import RivalWatch
 from damadics_fd.nodes.signature_publisher import SignaturePublisher, read_causes
 from damadics_fd.ros import qos
 from damadics_fd.ros.arguments import check_node_arguments
-from damadics_fd.ros.conversions import event_message, write_flag
+from damadics_fd.ros.conversions import event_message, isolation_message, write_flag
 from damadics_fd.ros.diagnostics import Level, Report
 from damadics_fd.ros.raw import Encoder, any_estimate, stamp_of
 from damadics_fd.ros.spin import spin
@@ -95,6 +95,7 @@ class DetectorNode(MonitoringNode):
         self._threshold = made.publisher(Float64Stamped, 'threshold', qos.SAMPLES)
         self._fault_flag = made.publisher(FaultFlag, 'fault_flag', qos.FLAG)
         self._fault_event = made.publisher(FaultEvent, 'fault_event', qos.EVENTS)
+        self._isolation = made.publisher(Isolation, 'isolation', qos.FLAG)
         self._rival = RivalWatch(self, made, self.refuse)
         self._signature = SignaturePublisher(
             self,
@@ -188,9 +189,14 @@ class DetectorNode(MonitoringNode):
 
     def _tell(self, events: Iterable[Event], frame_id: str, more: str = '') -> None:
         for event in events:
-            message = event_message(explain(event, self._causes, self.actuator), frame_id)
+            explained = explain(event, self._causes, self.actuator)
+            message = event_message(explained, frame_id)
             message.text = plain(message.text + more, SENTENCE)
             self._fault_event.publish(message)
+            own = bool(self._core.signature.state[0].own)
+            isolation = isolation_message(explained, frame_id, self.settings.mode, own)
+            if isolation:
+                self._isolation.publish(isolation)
         self._memory.keep()
 
     @property

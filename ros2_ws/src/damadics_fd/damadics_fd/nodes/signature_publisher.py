@@ -60,6 +60,7 @@ class SignaturePublisher:
     :param settings: that the signature was learned with.
     :param folder: keeps the learned signature and its trends over a restart; None for none.
     :param limits: of the trends, per quantity.
+    :param topic: to publish on; None where it is only kept.
     """
 
     def __init__(
@@ -71,6 +72,7 @@ class SignaturePublisher:
         settings: Settings,
         folder: Path | None,
         limits: Mapping[str, Sequence[float]],
+        topic: str | None = 'signature',
     ) -> None:
         self._node = node
         self._signature = signature
@@ -87,7 +89,9 @@ class SignaturePublisher:
         self._news: list[Ints] = []
         self._last: list[int] = []
         self._next = 0
-        self._publisher = entities.publisher(SignatureMessage, 'signature', qos.FLAG)
+        self._publisher = (
+            entities.publisher(SignatureMessage, topic, qos.FLAG) if topic is not None else None
+        )
 
     def restore(self) -> None:
         """Take up the signature of before, where there is a good one."""
@@ -147,9 +151,10 @@ class SignaturePublisher:
         self._last, self._next = present, stamp + PERIOD
         if self._folder and s.verified:
             self._contained(self._folder, stamp)
-        message = signature_message(self._signature, header_of(stamp, tag))
-        write_outlook(self._outlook, message)
-        self._publisher.publish(message)
+        if self._publisher:
+            message = signature_message(self._signature, header_of(stamp, tag))
+            write_outlook(self._outlook, message)
+            self._publisher.publish(message)
 
     def _contained(self, folder: Path, stamp: int) -> None:
         try:

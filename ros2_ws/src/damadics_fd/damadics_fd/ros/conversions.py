@@ -4,10 +4,11 @@
 
 from builtin_interfaces.msg import Time
 from damadics_msgs.msg import Estimate as EstimateMessage
-from damadics_msgs.msg import FaultEvent, FaultFlag, Measurement
+from damadics_msgs.msg import FaultEvent, FaultFlag, Isolation, Measurement
 from std_msgs.msg import Header
 
 from damadics_fd.core.approximator.state import Estimate
+from damadics_fd.core.decision.alarm import CHANGED, RAISED
 from damadics_fd.core.decision.events import Decision, Event
 from damadics_fd.core.sample import Sample
 from damadics_fd.core.stamps import SECOND
@@ -21,6 +22,8 @@ EVENT_FIELDS = tuple(  # that event and message have in common, but for the stam
     for name in FaultEvent.get_fields_and_field_types()
     if name in Event.__dataclass_fields__ and name != 'onset'
 )
+FOUND_BY_TEST = 'control-room test'
+FOUND_BY = ('threshold', 'signature')
 
 
 def nanoseconds(time: Time) -> int:
@@ -113,4 +116,32 @@ def event_message(event: Event, frame_id: str) -> FaultEvent:
     set_stamp(message.onset, event.onset)
     for name in EVENT_FIELDS:
         setattr(message, name, getattr(event, name))
+    return message
+
+
+def isolation_message(event: Event, frame_id: str, mode: str, own: bool) -> Isolation | None:
+    """
+    Return what a fault is taken for.
+
+    :param event: a transition of the alarm.
+    :param frame_id: tag of the actuator.
+    :param mode: of the monitor.
+    :param own: the signature raised the alarm, not the threshold.
+    :return: the message; None where the transition tells nothing of the cause.
+    """
+    if event.transition not in (RAISED, CHANGED):
+        return None
+    message = Isolation(
+        occurrence=event.occurrence,
+        test='' if mode == 'scada' else 'velocity',
+        found_by=FOUND_BY_TEST if mode == 'scada' else FOUND_BY[own],
+        candidate=[event.cause] if event.cause else [],
+        confidence=[event.confidence] if event.cause else [],
+        strength=event.strength,
+        deviation=event.spread,
+        text=event.text,
+    )
+    message.header.frame_id = frame_id
+    set_stamp(message.header.stamp, event.stamp)
+    set_stamp(message.onset, event.onset)
     return message

@@ -115,6 +115,11 @@ class ForwardJumps(Generic[Item]):
         self._steady = 0.0  # when [s]
         self._held: list[tuple[int, Item]] = []
 
+    @property
+    def holds(self) -> int:
+        """Number of samples that wait for others to agree."""
+        return len(self._held)
+
     def admit(self, stamp: int, item: Item, steady: float) -> list[Item]:
         """
         Take a sample.

@@ -79,6 +79,15 @@ class Bank:
         """
         return self._held.estimates
 
+    @property
+    def signatures(self) -> Array:
+        """
+        Return the state of the signature of each valve; a copy is not made.
+
+        :return: rows of `signature.state.State`.
+        """
+        return self._held.signatures
+
     def take(
         self, valve: NDArray[np.integer], stamp: Ints, signals: Mapping[str, Floats]
     ) -> Changes:

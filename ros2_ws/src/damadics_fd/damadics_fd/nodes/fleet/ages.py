@@ -6,12 +6,20 @@ import numpy as np
 
 from damadics_fd.core.record import Floats, Ints
 from damadics_fd.core.stamps import DATE, SECOND
-from damadics_fd.ros.freshness import BACK, default_max_age
+from damadics_fd.ros.freshness import (
+    BACK,
+    EVEN,
+    IN_WINDOW,
+    INTERRUPTED,
+    MISSED,
+    WINDOW,
+    default_max_age,
+)
 
 
 class Ages:
     """
-    Ages of the newest samples, as `core.freshness.Freshness` defines them, for many valves.
+    Ages of the newest samples, as `ros.freshness.Freshness` defines them, for many valves.
 
     :param periods: sample period of each valve [s].
     :param simulated: the clock is that of /clock.
@@ -22,22 +30,60 @@ class Ages:
         own = np.array([default_max_age(float(period)) for period in periods])
         self.limits = own if max_age == 0.0 else np.full(len(own), max_age)
         self._simulated = simulated
-        self._stamp = np.full(len(own), -1, np.int64)
-        self._least = np.full(len(own), np.inf)
+        count = len(own)
+        self._stamp = np.full(count, -1, np.int64)
+        self._steady = np.zeros(count)  # when it was heard [s]
+        self._least = np.full(count, np.inf)  # of steady time less stamp [s]
+        self._delay = np.zeros(count)  # of the newest sample: steady time less stamp [s]
+        self._usual = np.full(count, np.inf)  # time between two blocks [s]
+        self._pause = np.zeros(count)  # what the last interruption may have been [s]
+        self._window = np.zeros(count)  # when the present window began [s]
+        self._lowest = np.full(count, np.inf)  # delay in it [s]
+        self._before = np.full(count, np.inf)  # delay in the one before [s]
 
     def heard(self, valve: Ints, stamp: Ints, steady: float) -> None:
         """
         Note samples.
 
         :param valve: numbers, shape (n,).
-        :param stamp: of the measurements [ns], shape (n,).
+        :param stamp: of the measurements [ns], shape (n,); those of a valve in order.
         :param steady: time of a clock that is never set [s].
         """
-        again = stamp < self._stamp[valve] - int(BACK * SECOND)
-        if again.any():  # another run: its stamps begin anew
-            self._least[valve[again]] = np.inf
-        self._stamp[valve] = stamp
-        np.minimum.at(self._least, valve, steady - stamp / SECOND)
+        newest = np.full(len(self._stamp), -1, np.int64)
+        newest[valve] = stamp  # the last of each valve
+        v = np.flatnonzero(newest >= 0)
+        now = newest[v]
+        before, delay, gap = self._stamp[v], steady - now / SECOND, steady - self._steady[v]
+        first = (before < 0) | (now < before - int(BACK * SECOND))
+        first |= (before >= DATE) != (now >= DATE)  # another run: its stamps begin anew
+        usual = self._usual[v]
+        known = np.isfinite(usual)
+        paused = ~first & (gap > np.maximum(INTERRUPTED, MISSED * usual))
+        pause = np.where(first, 0.0, self._pause[v])
+        self._pause[v] = pause + np.where(paused, np.maximum(delay - self._delay[v], 0.0), 0.0)
+        self._begin_window(v[paused], steady, np.full(int(paused.sum()), np.inf))
+        learns = ~first & ~paused
+        usual = np.where(learns & known, usual + 0.2 * (gap - np.where(known, usual, 0.0)), usual)
+        self._usual[v] = np.where(learns & ~known, gap, usual)
+        self._least[v] = np.minimum(np.where(first, delay, self._least[v]), delay)
+        self._stamp[v], self._delay[v], self._steady[v] = now, delay, steady
+        self._forgive(v[self._pause[v] > 0.0], steady)
+
+    def _forgive(self, v: Ints, steady: float) -> None:
+        """Count a pause as none where samples run on with an even delay, which no queue has."""
+        if not len(v):
+            return
+        self._lowest[v] = np.minimum(self._lowest[v], self._delay[v])
+        usual = np.where(np.isfinite(self._usual[v]), self._usual[v], 0.0)
+        over = v[steady - self._window[v] > np.maximum(WINDOW, IN_WINDOW * usual)]
+        with np.errstate(invalid='ignore'):
+            even = over[np.abs(self._lowest[over] - self._before[over]) < EVEN]
+        self._least[even] += np.minimum(self._pause[even], self._lowest[even] - self._least[even])
+        self._pause[even] = 0.0
+        self._begin_window(over, steady, self._lowest[over].copy())
+
+    def _begin_window(self, v: Ints, steady: float, before: Floats) -> None:
+        self._window[v], self._before[v], self._lowest[v] = steady, before, np.inf
 
     def ages(self, clock: int, steady: float) -> Floats:
         """

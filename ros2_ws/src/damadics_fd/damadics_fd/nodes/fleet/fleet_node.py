@@ -8,28 +8,26 @@ from pathlib import Path
 
 import numpy as np
 from damadics_msgs.msg import (
-    FaultFlag,
-    FleetEvent,
     FleetLayout,
     FleetStatus,
     MeasurementBlock,
 )
 
-from damadics_fd.causes import explain
-from damadics_fd.core.decision.events import Decision, Event
+from damadics_fd.core.decision.events import Event
 from damadics_fd.core.sample import SIGNALS, Sample
-from damadics_fd.core.text import NAME, SENTENCE, plain
+from damadics_fd.core.text import NAME, plain
 from damadics_fd.nodes.fleet import blocks, status
 from damadics_fd.nodes.fleet.ages import Ages
-from damadics_fd.nodes.fleet.exposed import Exposed, expose
+from damadics_fd.nodes.fleet.jumps import Jumps
 from damadics_fd.nodes.fleet.keeping import Keeping
 from damadics_fd.nodes.fleet.members import Happening, Members, members_of
 from damadics_fd.nodes.fleet.services import FleetServices
+from damadics_fd.nodes.fleet.signatures import Signatures
+from damadics_fd.nodes.fleet.telling import Telling
 from damadics_fd.nodes.operator import OperatorActions
 from damadics_fd.nodes.signature_publisher import read_causes
 from damadics_fd.ros import qos
 from damadics_fd.ros.arguments import command_parser, split_ros_args
-from damadics_fd.ros.conversions import event_message, write_flag
 from damadics_fd.ros.diagnostics import Diagnostics, Level, Report
 from damadics_fd.ros.entities import Entities
 from damadics_fd.ros.parameters import Parameters
@@ -98,30 +96,35 @@ class FleetNode(SpinnableNode):
             [one.actuator for one in self._members.all],
         )
         self._gathered: list[tuple[int, Sample]] = []
-        self._make(min(exposed, len(self._members)))
+        self._jumps = Jumps(len(self._members))
+        self._entities = Entities(self)
+        self._telling = Telling(
+            self, self._entities, self._members, self._keeping, self._ages, self._causes
+        )
+        self._signatures = Signatures(
+            self, self._entities, self._members, folder, self._causes.limits
+        )
+        self._make(min(max(exposed, 0), len(self._members)))
 
     def _make(self, exposed: int) -> None:
-        made = self._entities = Entities(self)
+        made = self._entities
         self._layout = made.publisher(FleetLayout, 'fleet/layout', qos.FLAG)
         self._status = made.publisher(FleetStatus, 'fleet/status', qos.FLAG)
-        self._event = made.publisher(FleetEvent, 'fleet/fault_event', qos.EVENTS)
         actions = OperatorActions(self, made, 'fleet')
         FleetServices(made, actions, self._members, self._keeping, self._tell_all)
         self._diagnostics = Diagnostics(self, made, 'fleet', self._report)
-        self._exposed: dict[int, Exposed] = {
-            number: expose(made, number, member, self._gather)
-            for number, member in enumerate(self._members.all[:exposed])
-        }
+        self._telling.expose(exposed, self._gather)
+        self._signatures.restore(range(exposed))
         made.subscription(MeasurementBlock, 'measurement_block', self._take_block, qos.BLOCKS)
         made.timer(HEARTBEAT, self._beat)
-        if self._exposed:
+        if exposed:
             made.timer(GATHER, self._judge_gathered)
         layout = status.layout_message(self._members, self._version)
         layout.header.stamp = self.get_clock().now().to_msg()
         self._layout.publish(layout)
         self._beat()
         self.get_logger().info(
-            f'{len(self._members)} valves, {len(self._exposed)} with topics of their own, '
+            f'{len(self._members)} valves, {exposed} with topics of their own, '
             f'layout {self._version}'
         )
 
@@ -140,14 +143,19 @@ class FleetNode(SpinnableNode):
     def _judge(self, rows: blocks.Rows) -> None:
         if not len(rows.valve):
             return
+        now = time.monotonic()
+        rows = self._jumps.admit(rows, now)
+        if not len(rows.valve):
+            return
         self._keeping.begin(rows.valve, rows.stamp)
-        self._ages.heard(rows.valve, rows.stamp, time.monotonic())
-        taken = self._members.take(rows)
+        self._signatures.begin(rows.valve, rows.stamp)
+        self._ages.heard(rows.valve, rows.stamp, now)
+        taken = self._telling.judge(rows)
         self._judged += len(rows.valve)
         self._rejected += taken.refused
-        self._tell(taken.happened)
+        self._telling.tell(taken.happened)
         for number in taken.changed - {number for number, _ in taken.happened}:
-            self._publish_flag(number)
+            self._telling.flag(number)
 
     def _gather(self, number: int, data: bytes) -> None:
         self._gathered.append((number, sample_of(data)))
@@ -168,49 +176,20 @@ class FleetNode(SpinnableNode):
             )
         )
 
-    def _tell(self, happened: list[Happening], remark: str = '') -> None:
-        for number, event in happened:
-            member = self._members.all[number]
-            message = event_message(explain(event, self._causes, member.actuator), member.actuator)
-            message.text = plain(message.text + remark, SENTENCE)
-            self._event.publish(FleetEvent(valve=member.namespace, event=message))
-            if number in self._exposed:
-                self._exposed[number].event.publish(message)
-        for number in {number for number, _ in happened}:
-            self._keeping.keep(number)
-            self._publish_flag(number)
-
     def _tell_all(self, number: int, events: tuple[Event, ...], remark: str) -> None:
-        self._tell([Happening(number, event) for event in events], remark)
-
-    def _publish_flag(self, number: int) -> None:
-        if number not in self._exposed:
-            return
-        bank, place = self._members.at(number)
-        flag = FaultFlag()
-        flag.header.frame_id = self._members.all[number].actuator
-        write_flag(Decision(*bank.decisions[place].item()), flag)
-        age = self._now_ages()[number]
-        if not age <= self._ages.limits[number] and flag.state != FaultFlag.STATE_UNKNOWN:
-            flag.state = FaultFlag.STATE_NOT_MONITORING
-            flag.level = flag.level or FaultFlag.NE107_FUNCTION_CHECK
-        self._exposed[number].flag.publish(flag)
-
-    def _now_ages(self) -> np.ndarray:
-        return self._ages.ages(self.get_clock().now().nanoseconds, time.monotonic())
+        self._telling.tell([Happening(number, event) for event in events], remark)
 
     def _beat(self) -> None:
         self._keeping.again()
-        ages = self._now_ages()
+        self._signatures.update()
+        ages = self._telling.ages()
         message = status.status_message(self._members, self._version, ages, self._ages.limits)
         message.header.stamp = self.get_clock().now().to_msg()
         self._status.publish(message)
-        for number in self._exposed:
-            self._publish_flag(number)
+        self._telling.beat(ages)
 
     def _report(self) -> Report:
-        ages = self._now_ages()
-        blind = int(np.count_nonzero(~(ages <= self._ages.limits)))
+        blind = int(np.count_nonzero(~(self._telling.ages() <= self._ages.limits)))
         faults = int(np.count_nonzero(self._members.column('fault', np.bool_)))
         refused = sum(self._refused.by_reason.values())
         values = {
@@ -219,12 +198,13 @@ class FleetNode(SpinnableNode):
             'Valves without fresh samples': blind,
             'Samples judged': self._judged - self._rejected,
             'Samples refused by their monitors': self._rejected,
+            'Samples stamped far ahead': self._jumps.refused,
             **{f'Blocks refused: {why}': n for why, n in self._refused.by_reason.items()},
             **{f'Refused of {who}': n for who, n in self._refused.by_sender.items()},
         }
         if self._entities.problem:
             return Level.ERROR, self._entities.problem, values
-        if problems := self._keeping.problems:
+        if problems := self._keeping.problems + self._signatures.problems:
             return Level.ERROR, problems[0], values
         if faults:
             return Level.ERROR, f'{faults} valves with a fault', values

@@ -160,7 +160,7 @@ class Keeping:
         return self._memories[number]
 
     def _file(self, number: int) -> str:
-        return self._members.all[number].namespace.strip('/').replace('/', '__')
+        return self._members.all[number].file
 
     def _of(self, number: int) -> set[str]:
         stem = self._file(number)

@@ -46,6 +46,11 @@ class Member:
     reference: Path | None  # without ".a.json"
     measurement: str  # topic
 
+    @property
+    def file(self) -> str:
+        """Name of its files, as the nodes of one valve name them."""
+        return self.namespace.strip('/').replace('/', '__')
+
 
 class Happening(NamedTuple):
     """Hold a transition of the alarm of one valve."""

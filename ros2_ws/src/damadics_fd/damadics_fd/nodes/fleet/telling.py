@@ -1,0 +1,163 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""What a fleet tells of its valves: events and causes of all, all topics of exposed ones."""
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+from damadics_msgs.msg import FaultFlag, FleetEvent, FleetIsolation
+from numpy.typing import NDArray
+from rclpy.node import Node
+
+from damadics_fd.causes import CauseTable, explain
+from damadics_fd.core.approximator.state import Estimate
+from damadics_fd.core.decision.events import Decision
+from damadics_fd.core.record import Floats
+from damadics_fd.core.text import SENTENCE, plain
+from damadics_fd.nodes.fleet.ages import Ages
+from damadics_fd.nodes.fleet.blocks import Rows
+from damadics_fd.nodes.fleet.exposed import Exposed
+from damadics_fd.nodes.fleet.keeping import Keeping
+from damadics_fd.nodes.fleet.members import Happening, Members, Taken
+from damadics_fd.ros import qos
+from damadics_fd.ros.conversions import event_message, isolation_message, write_flag
+from damadics_fd.ros.entities import Entities
+
+
+class Telling:
+    """
+    Publish events, causes, and the topics of exposed valves.
+
+    :param node: the fleet's node.
+    :param entities: of the node.
+    :param members: the valves.
+    :param keeping: their alarms.
+    :param ages: of their samples.
+    :param causes: texts and advice.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        entities: Entities,
+        members: Members,
+        keeping: Keeping,
+        ages: Ages,
+        causes: CauseTable,
+    ) -> None:
+        self._node = node
+        self._entities = entities
+        self._members = members
+        self._keeping = keeping
+        self._ages = ages
+        self._causes = causes
+        self._event = entities.publisher(FleetEvent, 'fleet/fault_event', qos.EVENTS)
+        self._isolation = entities.publisher(FleetIsolation, 'fleet/isolation', qos.EVENTS)
+        self._exposed: dict[int, Exposed] = {}
+        self._watched: list[int] = []
+
+    def expose(self, count: int, take: Callable[[int, bytes], None]) -> None:
+        """
+        Give valves topics of their own.
+
+        :param count: how many, from the first.
+        :param take: called with the number of a valve and its serialised measurement.
+        """
+        for number, member in enumerate(self._members.all[:count]):
+            self._exposed[number] = Exposed(self._entities, number, member, take)
+
+    def judge(self, rows: Rows) -> Taken:
+        """
+        Have rows judged; those of valves that somebody listens to one by one, and published.
+
+        :param rows: checked rows.
+        :return: what became of them.
+        """
+        watched = np.isin(rows.valve, self._watched)
+        if not self._watched or not watched.any():
+            return self._members.take(rows)
+        parts = [self._members.take(_some(rows, ~watched))] if not watched.all() else []
+        for row in np.flatnonzero(watched):
+            taken = self._members.take(_some(rows, np.arange(len(watched)) == row))
+            parts.append(taken)
+            if not taken.refused:
+                number = int(rows.valve[row])
+                bank, place = self._members.at(number)
+                decision = Decision(*bank.decisions[place].item())
+                self._exposed[number].sample(Estimate(*bank.estimates[place].item()), decision)
+        return Taken(
+            [one for part in parts for one in part.happened],
+            sum(part.refused for part in parts),
+            set().union(*(part.changed for part in parts)),
+        )
+
+    def tell(self, happened: list[Happening], remark: str = '') -> None:
+        """
+        Tell transitions of alarms, and keep them.
+
+        :param happened: the transitions.
+        :param remark: who caused them and why.
+        """
+        for number, event in happened:
+            member = self._members.all[number]
+            tag, place = member.actuator, member.namespace
+            explained = explain(event, self._causes, tag)
+            message = event_message(explained, tag)
+            message.text = plain(message.text + remark, SENTENCE)
+            self._event.publish(FleetEvent(valve=place, event=message))
+            signature = self._keeping.detector(number).signature.state[0]
+            isolation = isolation_message(
+                explained, tag, member.settings.mode, bool(signature.own)
+            )
+            if isolation:
+                self._isolation.publish(FleetIsolation(valve=place, isolation=isolation))
+            if number in self._exposed:
+                self._exposed[number].event.publish(message)
+                if isolation:
+                    self._exposed[number].isolation.publish(isolation)
+        for number in {number for number, _ in happened}:
+            self._keeping.keep(number)
+            self.flag(number)
+
+    def flag(self, number: int) -> None:
+        """
+        Publish the flag of a valve, if it is exposed.
+
+        :param number: of the valve.
+        """
+        if number in self._exposed:
+            self._flag(number, self.ages()[number])
+
+    def beat(self, ages: Floats) -> None:
+        """
+        Publish the flags of all exposed valves, and see who listens to them.
+
+        :param ages: of all valves.
+        """
+        self._watched = [n for n, one in self._exposed.items() if one.watched]
+        for number in self._exposed:
+            self._flag(number, ages[number])
+
+    def ages(self) -> Floats:
+        """
+        Return the ages of the newest samples of all valves.
+
+        :return: [s], NaN before the first.
+        """
+        return self._ages.ages(self._node.get_clock().now().nanoseconds, time.monotonic())
+
+    def _flag(self, number: int, age: float) -> None:
+        bank, place = self._members.at(number)
+        flag = FaultFlag()
+        flag.header.frame_id = self._members.all[number].actuator
+        write_flag(Decision(*bank.decisions[place].item()), flag)
+        if not age <= self._ages.limits[number] and flag.state != FaultFlag.STATE_UNKNOWN:
+            flag.state = FaultFlag.STATE_NOT_MONITORING
+            flag.level = flag.level or FaultFlag.NE107_FUNCTION_CHECK
+        self._exposed[number].flag.publish(flag)
+
+
+def _some(rows: Rows, which: NDArray[np.bool_]) -> Rows:
+    signals = {name: column[which] for name, column in rows.signals.items()}
+    return Rows(rows.valve[which], rows.stamp[which], signals)
