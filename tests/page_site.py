@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A dashboard fed by the test itself: valves that say what the test wants, without a plant."""
 
+import atexit
 import json
 import threading
 import time
@@ -63,6 +64,7 @@ class Voices:
         self._executor = executor
         self._thread = threading.Thread(target=executor.spin, daemon=True)
         self._thread.start()
+        atexit.register(self.close)  # a spinning thread would abort the interpreter's end
 
     def say(self, topic: str, message: Any, profile: Any = qos.FLAG) -> None:
         """Publish once."""
@@ -87,6 +89,7 @@ class Voices:
         self.say(_topic(valve, 'fault_event'), event, qos.EVENTS)
 
     def close(self) -> None:
+        atexit.unregister(self.close)
         self._executor.shutdown()
         self._thread.join(5.0)
         self.node.destroy_node()

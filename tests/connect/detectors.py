@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A detector of the test: publishes flags and events as the real one does, serves its services."""
 
+import atexit
 import threading
 import time
 
@@ -42,6 +43,7 @@ class Detectors:
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._spin, daemon=True)
         self._thread.start()
+        atexit.register(self.close)  # a spinning thread would abort the interpreter's end
 
     def judge(self, valve: str, transition: int, text: str = '', **fields) -> int:
         """Publish a transition and the flag that goes with it; return its stamp."""
@@ -77,6 +79,7 @@ class Detectors:
         self.close()
 
     def close(self) -> None:
+        atexit.unregister(self.close)
         self._stop.set()
         self._thread.join(5.0)
         self.executor.shutdown()
