@@ -24,10 +24,22 @@ autodoc_default_options = {'members': True, 'show-inheritance': False}
 apidoc_modules = [
     {
         'path': str(SOURCES / package / package),
-        'destination': 'api',
+        'destination': f'api/{package}',  # one each: what is not made again is removed
         'max_depth': 3,
         'separate_modules': True,
         'automodule_options': {'members'},
     }
-    for package in ('damadics_fd', 'damadics_plant', 'damadics_evaluate')
+    for package in ('damadics_fd', 'damadics_plant', 'damadics_evaluate', 'damadics_connect')
 ]
+
+
+def _bars(app, what, name, thing, options, lines) -> None:
+    """Let `|x|` in a docstring be the absolute value it is: Sphinx takes it for a substitution."""
+    for number, line in enumerate(lines):
+        if '``' not in line and not line.lstrip().startswith(('>>>', '...', '|', '+')):
+            lines[number] = line.replace('|', '\\|')
+
+
+def setup(app) -> None:
+    """Register what docstrings go through."""
+    app.connect('autodoc-process-docstring', _bars)
