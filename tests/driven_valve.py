@@ -90,7 +90,11 @@ class Valve:
 def start(processes, peer, alarms='auto', **settings) -> Valve:
     settings = {**SETTINGS, **settings}
     processes.start('damadics_fd', 'estimator', parameters(**settings))
-    processes.start('damadics_fd', 'detector', parameters(alarm_folder=alarms, **settings))
+    processes.start(
+        'damadics_fd',
+        'detector',
+        parameters(alarm_folder=alarms, allow_partial_stroke=True, **settings),
+    )
     valve = Valve(peer)
     assert peer.wait(lambda: valve.flags, 30.0), 'the detector did not start'
     assert peer.wait(lambda: peer.node.count_subscribers('/measurement') > 0, 30.0)

@@ -13,8 +13,8 @@ from damadics_bringup.policy import policy
 from damadics_bringup.processes import Processes, executable, parameters, surroundings
 from damadics_fd.ros import qos
 from damadics_fd.store.fleet_file import Valve as FleetEntry
-from damadics_msgs.msg import FaultEvent, FaultFlag, Measurement
-from damadics_msgs.srv import Acknowledge, Relearn, ResetAlarm, Shelve
+from damadics_msgs.msg import FaultEvent, FaultFlag, Measurement, StrokeRequest
+from damadics_msgs.srv import Acknowledge, PartialStroke, Relearn, ResetAlarm, Shelve
 from driven_valve import SETTINGS, Valve, start
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
@@ -74,6 +74,22 @@ def test_services_say_what_was_done_or_why_not(valve):
     assert valve.run_until(lambda: valve.flags[-1].state == FaultFlag.STATE_HEALTHY)
     refused = valve.call(Relearn, 'relearn')
     assert (refused.success, 'paper' in refused.message) == (False, True)
+
+
+def test_partial_strokes_end_with_the_measurement_and_are_refused_under_an_alarm(valve):
+    asked = valve.peer.listen(StrokeRequest, 'stroke_request', qos.COMMANDS)
+    ask = {'amplitude': 0.05, 'count': 3, 'user': 'Anna', 'comment': 'monthly check'}
+    # the detector may first have to discover who takes its requests
+    assert valve.run_until(
+        lambda: asked or (valve.call(PartialStroke, 'partial_stroke', **ask).success and asked)
+    )
+    assert [(m.amplitude, m.count) for m in asked] == [(0.05, 3)]
+    assert 'going on' in valve.call(PartialStroke, 'partial_stroke', **ask).message
+    assert valve.peer.wait(lambda: len(asked) > 1, 10.0), 'the valve was lost, the strokes went on'
+    assert (asked[1].request, asked[1].count) == (asked[0].request, 0)
+    valve.raise_alarm()
+    assert 'alarm stands' in valve.call(PartialStroke, 'partial_stroke', **ask).message
+    assert len(asked) == 2
 
 
 def test_a_late_joiner_gets_the_flag_and_all_events(valve):

@@ -37,7 +37,15 @@ LIFECYCLE = (
 )
 SAMPLES = ('measurement', 'estimate', 'threshold', 'fault_flag', 'fault_event')
 ALL = (*SAMPLES, 'residual', 'signature', 'fault_state', 'operator_action', 'isolation')
-OPERATE = ('acknowledge', 'reset', 'shelve', 'relearn', 'save_reference', 'load_reference')
+OPERATE = (
+    'acknowledge',
+    'reset',
+    'shelve',
+    'relearn',
+    'save_reference',
+    'load_reference',
+    'partial_stroke',
+)
 
 
 @dataclass
@@ -64,15 +72,18 @@ NODES = {  # of every valve
             'fault_event',
             'signature',
             'operator_action',
+            'stroke_request',
             '/diagnostics',
             '~/transition_event',
         ),
         ('estimate', 'fault_flag'),
-        ('acknowledge', 'reset', 'shelve', *(f'~/{name}' for name in LIFECYCLE)),
+        ('acknowledge', 'reset', 'shelve', 'partial_stroke', *(f'~/{name}' for name in LIFECYCLE)),
     ),
-    'driver': Rights(('measurement',)),  # of the plant: its name is for you to choose
+    'driver': Rights(
+        ('measurement',), ('stroke_request',)
+    ),  # of the plant: its name is for you to choose
 }
-PLANT = Rights(('measurement', 'fault_state', '/clock'), (), ('inject_fault',))
+PLANT = Rights(('measurement', 'fault_state', '/clock'), ('stroke_request',), ('inject_fault',))
 
 
 def policy(

@@ -13,7 +13,7 @@ from damadics_fd.ros import qos
 from damadics_fd.ros.arguments import check_node_arguments
 from damadics_fd.ros.parameters import Parameters
 from damadics_fd.ros.spin import SpinnableNode, spin
-from damadics_msgs.msg import FaultState, Measurement
+from damadics_msgs.msg import FaultState, Measurement, StrokeRequest
 from damadics_msgs.srv import InjectFault
 from rclpy.clock import Clock, ClockType
 from rosgraph_msgs.msg import Clock as ClockMessage
@@ -92,6 +92,7 @@ class Plant(SpinnableNode):
         self._measurement = self.create_publisher(Measurement, 'measurement', qos.SAMPLES)
         self._fault_state = self.create_publisher(FaultState, 'fault_state', qos.SAMPLES)
         self.create_service(InjectFault, 'inject_fault', self._inject)
+        self.create_subscription(StrokeRequest, 'stroke_request', self._stroke, qos.COMMANDS)
         self._clock_topic = None
         if publish_clock:
             self._clock_topic = self.create_publisher(ClockMessage, '/clock', 10)
@@ -155,6 +156,13 @@ class Plant(SpinnableNode):
             response.message = f'not injected: {problem}'
         self.get_logger().info(response.message)
         return response
+
+    def _stroke(self, request: StrokeRequest) -> None:
+        """Make partial strokes from the next sample on that is not yet simulated, or end them."""
+        try:
+            self._simulator.stroke(request.amplitude, request.count)
+        except ValueError as problem:
+            self.get_logger().warning(f'no partial strokes: {problem}')
 
     def _publish(self, count: int) -> None:
         """Publish the next samples, then the time that they have brought."""

@@ -20,6 +20,7 @@ from damadics_plant.scenarios.level import LevelLoop
 from damadics_plant.scenarios.library import load_scenario
 from damadics_plant.scenarios.scenario import Scenario
 from damadics_plant.scenarios.sources import RandomSteps, Source
+from damadics_plant.strokes import Strokes
 
 MODELS: dict[str, tuple[type[Actuator], ModuleType]] = {
     'dablib': (Actuator, dablib),
@@ -90,6 +91,7 @@ class Simulator:
         self._loop = self._sources[0] if isinstance(self._sources[0], LevelLoop) else None
         self._inflow = 0.0  # sum over the ticks of the loop's present period [kg/s]
         self._override: float | None = None
+        self._strokes: Strokes | None = None
         self._disturbance = Disturbance(seed) if noise else None
         self._noisy_outputs = noise is True
         self._done = 0
@@ -151,6 +153,18 @@ class Simulator:
             raise ValueError(f'cv: {value!r} is not within 0..1')
         self._override = value
 
+    def stroke(self, amplitude: float, count: int) -> None:
+        """
+        Make partial strokes about the present control value, from the next sample on.
+
+        :param amplitude: half of a stroke, share of full travel, above 0 and at most 0.5.
+        :param count: how many; 0 ends those under way.
+        :raises ValueError: if the amplitude is out of range.
+        """
+        if count and not 0.0 < amplitude <= 0.5:
+            raise ValueError(f'amplitude: {amplitude!r} is not above 0 and at most 0.5')
+        self._strokes = Strokes(self.time, amplitude, count) if count else None
+
     def inject(self, fault: str, strength: float = 1.0, development: float = 0.0) -> None:
         """
         Let a fault begin with the next sample.
@@ -208,6 +222,8 @@ class Simulator:
             row[:] = source.at(t)
         if self._override is not None:
             inputs[0] = self._override
+        if self._strokes:
+            self._strokes.apply(t, inputs[0])
         out = np.empty((1 + ROWS, n))
         out[0] = inputs[0, ::every]
         if self._disturbance:

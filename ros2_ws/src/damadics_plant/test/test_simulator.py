@@ -202,3 +202,20 @@ def test_same_source_runs_uncompiled(model):
     compiled = simulate('paper_friction', model=model, rate=50, duration=4).x1
     assert plain == pytest.approx(compiled, abs=1e-9)
     assert compiled[-1] > 0.05
+
+
+def test_partial_strokes_go_to_both_sides_of_the_command_and_end():
+    simulator = Simulator('nominal', rate=100.0, duration=30.0)
+    before = simulator.advance(500)['cv'][-1]
+    simulator.stroke(0.05, 2)
+    cv = simulator.advance(1600)['cv'] - Simulator('nominal', rate=100.0).advance(2100)['cv'][500:]
+    assert 0.05 < before < 0.95
+    np.testing.assert_allclose(cv[:1600].reshape(4, 400), np.outer([1, -1, 1, -1], [0.05] * 400))
+    simulator.stroke(0.05, 9)
+    simulator.stroke(0.0, 0)
+    rest = simulator.advance(400)['cv']
+    np.testing.assert_array_equal(
+        rest, Simulator('nominal', rate=100.0).advance(2500)['cv'][2100:]
+    )
+    with pytest.raises(ValueError, match='amplitude'):
+        simulator.stroke(0.6, 1)

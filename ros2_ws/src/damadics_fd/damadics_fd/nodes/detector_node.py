@@ -20,6 +20,7 @@ from damadics_fd.nodes.detector_report import report_of
 from damadics_fd.nodes.joint import Joints, Taker
 from damadics_fd.nodes.managed import MonitoringNode
 from damadics_fd.nodes.operator import OperatorActions, OperatorServices
+from damadics_fd.nodes.partial_strokes import PartialStrokes, StrokeLimits
 from damadics_fd.nodes.second_publisher import RivalWatch
 from damadics_fd.nodes.signature_publisher import SignaturePublisher, read_causes
 from damadics_fd.ros import qos
@@ -78,6 +79,17 @@ class DetectorNode(MonitoringNode):
             'folder that keeps signature and trends over a restart; '
             '"auto": beside the alarms, in mode paper none; "": none',
         )
+        self._stroke_limits = StrokeLimits(
+            self.parameters.declare(
+                'allow_partial_stroke', False, 'pass requests for partial strokes on to the driver'
+            ),
+            self.parameters.declare(
+                'partial_stroke_limit',
+                0.1,
+                'greatest amplitude of a partial stroke, share of full travel',
+                limits=(0.001, 0.5),
+            ),
+        )
 
     def make(self) -> None:
         """Begin afresh, with the alarms from before where they are kept."""
@@ -113,6 +125,9 @@ class DetectorNode(MonitoringNode):
         self._signature.restore()
         actions = OperatorActions(self, made, self.actuator)
         OperatorServices(made, actions, self._core, self._operated)
+        self._strokes = PartialStrokes(
+            made, actions, self._core, self._stroke_limits, lambda: self._blind
+        )
         made.timer(min(self.watch.timeout / 5.0, HEARTBEAT), self._look)
         made.timer(HEARTBEAT, self._beat)
         self._join(self.watch.subscribe(EstimateMessage, self._read, self._take, qos.SAMPLES))
@@ -149,6 +164,7 @@ class DetectorNode(MonitoringNode):
         if decision is not None:
             self._publish(decision, tag)
             self._keep(decision, tag)
+            self._strokes.follow(estimate, tag)
 
     def _judge(self, estimate: Estimate) -> Decision | None:
         """Judge an estimate; None where it is not to be judged."""
@@ -214,6 +230,8 @@ class DetectorNode(MonitoringNode):
         turned = self._was_silent != self._blind
         if turned:
             self._was_silent = not self._was_silent
+            if self._was_silent:
+                self._strokes.end('the valve is not seen any more')
             self._publish_flag()
             self.diagnostics.check()
         return turned

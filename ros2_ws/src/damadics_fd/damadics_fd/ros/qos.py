@@ -38,3 +38,4 @@ def latched(depth: int) -> QoSProfile:
 FLAG = latched(1)
 EVENTS = latched(100)
 DIAGNOSTICS = QoSProfile(depth=10)
+COMMANDS = QoSProfile(depth=10)  # volatile: who comes late moves nothing

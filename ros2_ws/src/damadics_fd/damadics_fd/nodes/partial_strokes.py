@@ -1,0 +1,183 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Partial strokes: small moves that a person asks for and the driver of the valve makes.
+
+The monitor commands nothing itself: it checks the request, passes it on as `stroke_request`, and
+asks for the end as soon as it does not see the valve or an alarm stands.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from damadics_msgs.msg import OperatorAction, StrokeRequest
+from damadics_msgs.srv import PartialStroke
+
+from damadics_fd.core.approximator.state import Estimate
+from damadics_fd.core.decision.detector import Detector
+from damadics_fd.nodes.operator import OperatorActions
+from damadics_fd.ros import qos
+from damadics_fd.ros.conversions import set_stamp
+from damadics_fd.ros.entities import Entities
+
+MOST_STROKES = 20  # of one request
+PATIENCE = 30.0  # s that a stroke may take
+SEEN = 0.5  # of the amplitude: a stem that goes so far to both sides has made a stroke
+
+
+@dataclass(frozen=True)
+class StrokeLimits:
+    """What a request may ask for."""
+
+    allowed: bool
+    amplitude: float  # greatest, share of full travel
+
+
+@dataclass
+class Strokes:
+    """Strokes that are being made."""
+
+    count: int
+    amplitude: float
+    centre: float  # position when they were asked for
+    began: int  # ns
+    halves: int = 0
+    side: int = 0  # 1 above the centre, -1 below
+
+
+class PartialStrokes:
+    """
+    Serve `partial_stroke`, publish `stroke_request`.
+
+    :param entities: of the node.
+    :param actions: the record of what people do.
+    :param core: the detector.
+    :param limits: what may be asked for.
+    :param blind: tells whether the latest judgement says nothing about now.
+    """
+
+    def __init__(
+        self,
+        entities: Entities,
+        actions: OperatorActions,
+        core: Detector,
+        limits: StrokeLimits,
+        blind: Callable[[], bool],
+    ) -> None:
+        self._actions = actions
+        self._core = core
+        self._limits = limits
+        self._blind = blind
+        self._estimate: Estimate | None = None
+        self._strokes: Strokes | None = None
+        self._message = StrokeRequest()
+        self._publisher = entities.publisher(StrokeRequest, 'stroke_request', qos.COMMANDS)
+        entities.service(PartialStroke, 'partial_stroke', self._serve)
+        entities.on_release(lambda: self.end('the monitor was stopped'))
+
+    def follow(self, estimate: Estimate, frame_id: str) -> None:
+        """
+        Watch the stem; end the strokes when they are made, late, or an alarm stands.
+
+        :param estimate: the newest.
+        :param frame_id: tag of the actuator.
+        """
+        self._estimate = estimate
+        self._message.header.frame_id = frame_id
+        strokes = self._strokes
+        if strokes is None:
+            return
+        moved = estimate.x1 - strokes.centre
+        side = int(math.copysign(1, moved))
+        if abs(moved) >= SEEN * strokes.amplitude and side != strokes.side:
+            strokes.side = side
+            strokes.halves += 1
+        if self._standing:
+            self.end('an alarm stands')
+        elif strokes.halves >= 2 * strokes.count:
+            self._finish(True, f'{strokes.count} partial strokes were made')
+        elif (estimate.stamp - strokes.began) * 1e-9 > PATIENCE * strokes.count:
+            made = strokes.halves // 2
+            self.end(f'the driver made {made} of {strokes.count} in time')
+
+    def end(self, cause: str) -> None:
+        """
+        Ask the driver to end the strokes, where there are any.
+
+        :param cause: why.
+        """
+        if self._strokes is not None:
+            self._send(0.0, 0)
+            self._finish(False, f'partial strokes ended: {cause}')
+
+    @property
+    def _standing(self) -> bool:
+        """Whether there is an alarm, a shelved or latched one too."""
+        s = self._core.state[0]
+        return bool(s.active or s.latched)
+
+    def _finish(self, done: bool, text: str) -> None:
+        self._strokes = None
+        stamp = self._estimate.stamp if self._estimate else 0
+        self._actions.tell(OperatorAction.PARTIAL_STROKE, done, text, stamp=stamp)
+
+    def _serve(
+        self, request: PartialStroke.Request, response: PartialStroke.Response
+    ) -> PartialStroke.Response:
+        estimate = self._estimate
+        response.message = self._refusal(request)
+        response.success = not response.message
+        if response.success and request.count == 0:
+            self._strokes = None
+            self._send(0.0, 0)
+            response.message = 'the driver was asked to end the partial strokes'
+        elif response.success and estimate:
+            self._message.request += 1
+            self._strokes = Strokes(request.count, request.amplitude, estimate.x1, estimate.stamp)
+            self._send(request.amplitude, request.count)
+            response.message = (
+                f'the driver was asked for {request.count} partial strokes of '
+                f'+-{100.0 * request.amplitude:g} %'
+            )
+        self._actions.tell(
+            OperatorAction.PARTIAL_STROKE,
+            response.success,
+            response.message,
+            stamp=estimate.stamp if estimate else 0,
+            user=request.user,
+            comment=request.comment,
+        )
+        return response
+
+    def _refusal(self, request: PartialStroke.Request) -> str:
+        """Say why a request is refused, '' where it is not."""
+        limits, amplitude, estimate = self._limits, request.amplitude, self._estimate
+        if not limits.allowed:
+            return 'partial strokes are not allowed here: allow_partial_stroke is false'
+        if request.count == 0:
+            return '' if self._strokes else 'there are no partial strokes to end'
+        if self._strokes:
+            return 'partial strokes are going on: wait, or end them with count 0'
+        if not 0.0 < amplitude <= limits.amplitude:
+            return (
+                f'amplitude = {amplitude:g} is not within 0..{limits.amplitude:g}: '
+                'partial_stroke_limit is the greatest'
+            )
+        if request.count > MOST_STROKES:
+            return f'count = {request.count} is more than {MOST_STROKES}'
+        if estimate is None or self._blind():
+            return 'the valve is not seen: no measurement is being judged'
+        if self._standing:
+            return 'an alarm stands: reset it first'
+        if not amplitude <= estimate.x1 <= 1.0 - amplitude:
+            return f'the stem is at {estimate.x1:.2f}: +-{amplitude:g} would leave 0..1'
+        if not self._publisher.get_subscription_count():
+            return 'no driver of this valve takes stroke_request'
+        return ''
+
+    def _send(self, amplitude: float, count: int) -> None:
+        message = self._message
+        message.amplitude, message.count = amplitude, count
+        set_stamp(message.header.stamp, self._estimate.stamp if self._estimate else 0)
+        self._publisher.publish(message)
