@@ -23,7 +23,16 @@ QUIET, AFTER = 240.0, 300.0  # s before and after the onset
 FRICTION = (-0.5, 0.3, 0.5, 1.0, 3.0)  # shares of the friction
 SPRING = (-0.2, -0.05, -0.02, 0.02, 0.05)  # and of the stiffness
 FULL = 20.0  # times the friction, that fault f4 adds at strength 1
-NOISE_X, NOISE_PS, NOISE_P = 5e-4, 150.0, 2e3  # of good transmitters; Pa
+OPERATION = {  # of a twin that does not tell its own: the benchmark's pressures, good transmitters
+    'p1': 3.5e6,
+    'p1_swing': 7e4,
+    'p2': 2.6e6,
+    'p2_swing': 2.6e4,
+    'x1_noise': 5e-4,
+    'ps_noise': 150.0,
+    'p1_noise': 2e3,
+    'p2_noise': 2e3,
+}
 RATE = 200.0
 
 
@@ -38,6 +47,15 @@ class Row:
     delay: float  # [s] since the onset; NaN where it was not found
     cause: str
     size: float
+
+
+@dataclass(frozen=True)
+class Valve:
+    """Hold what commission found of a valve."""
+
+    actuator: LuGreActuator
+    settings: Settings  # of the monitor
+    operation: dict[str, float]  # see OPERATION
 
 
 def add_parser(commands: 'argparse._SubParsersAction[argparse.ArgumentParser]') -> None:
@@ -63,8 +81,7 @@ def detectability(arguments: argparse.Namespace) -> int:
     :return: 0.
     :raises ValueError: where the file is no twin.
     """
-    actuator, settings = read_twin(arguments.valve), settings_of(arguments.valve)
-    rows = list(study(actuator, settings, arguments.seeds))
+    rows = list(study(read_valve(arguments.valve), arguments.seeds))
     print(f'{"change":>18}  found  delay, median [s]  named')
     for quantity, change in dict.fromkeys((row.quantity, row.change) for row in rows):
         group = [row for row in rows if (row.quantity, row.change) == (quantity, change)]
@@ -86,46 +103,54 @@ def detectability(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def settings_of(path: Path) -> Settings:
+def read_valve(path: Path) -> Valve:
     """
-    Return the settings that commission found for the valve.
+    Read what commission found of a valve.
 
     :param path: of the twin.
-    :return: settings of mode monitor.
-    :raises ValueError: where they are wrong.
+    :return: the valve.
+    :raises ValueError: naming what is wrong.
     """
+    actuator = read_twin(path)
     content = yaml.safe_load(path.read_text(encoding='utf-8'))
-    return Settings.for_mode('monitor', **(content.get('settings') or {}))
+    operation = OPERATION | (content.get('operation') or {})
+    wrong = [
+        name
+        for name, value in operation.items()
+        if name not in OPERATION or not isinstance(value, (int, float)) or not 0.0 <= value < 1e9
+    ]
+    if wrong:
+        raise ValueError(f'{path}: wrong in its part operation: {", ".join(wrong)}')
+    return Valve(
+        actuator, Settings.for_mode('monitor', **(content.get('settings') or {})), operation
+    )
 
 
-def study(actuator: LuGreActuator, settings: Settings, seeds: int) -> Iterator[Row]:
+def study(valve: Valve, seeds: int) -> Iterator[Row]:
     """
     Run the twin with every fault.
 
-    :param actuator: the twin.
-    :param settings: of the monitor.
+    :param valve: the valve.
     :param seeds: runs per fault.
     :return: a row for each run.
     """
     for quantity, changes in (('friction', FRICTION), ('spring', SPRING)):
         for change in changes:
             for seed in range(seeds):
-                yield trial(actuator, settings, quantity, change, seed)
+                yield trial(valve, quantity, change, seed)
 
 
-def trial(
-    actuator: LuGreActuator, settings: Settings, quantity: str, change: float, seed: int
-) -> Row:
+def trial(valve: Valve, quantity: str, change: float, seed: int) -> Row:
     """
     Run the twin with one fault as a step.
 
-    :param actuator: the twin.
-    :param settings: of the monitor.
+    :param valve: the valve.
     :param quantity: friction or spring.
     :param change: share of it.
     :param seed: of command and noise.
     :return: what became of it.
     """
+    o = valve.operation
     key, strength = ('f4', change / FULL if change > 0.0 else change)
     if quantity == 'spring':
         key, strength = 'f11', change
@@ -133,18 +158,18 @@ def trial(
         name='detectability',
         duration=QUIET + AFTER,
         cv=RandomSteps(seed=seed),
-        p1=Sine(3.5e6, 7e4, 0.1),
-        p2=Sine(2.6e6, 2.6e4, 0.3),
+        p1=Sine(o['p1'], o['p1_swing'], 0.1),
+        p2=Sine(o['p2'], o['p2_swing'], 0.3),
         faults=(Fault(key, strength, QUIET),),
     )
-    result = simulate(scenario, rate=RATE, model=actuator, seed=seed)
+    result = simulate(scenario, rate=RATE, model=valve.actuator, seed=seed)
     rng = np.random.default_rng(seed)
     columns = {name: np.array(result[name]) for name in ('cv', 'x1', 'p1', 'p2', 'ps')}
     n = len(columns['x1'])
-    for name, sigma in (('x1', NOISE_X), ('ps', NOISE_PS), ('p1', NOISE_P), ('p2', NOISE_P)):
-        columns[name] = columns[name] + sigma * rng.standard_normal(n)
+    for name in ('x1', 'ps', 'p1', 'p2'):
+        columns[name] = columns[name] + o[f'{name}_noise'] * rng.standard_normal(n)
     stamp = np.round(np.arange(n) / RATE * 1e9).astype(np.int64)
-    judged = run({'stamp': stamp, **columns}, settings.replace(sample_rate=RATE))
+    judged = run({'stamp': stamp, **columns}, valve.settings.replace(sample_rate=RATE))
     raised = [e.stamp * 1e-9 for e in judged.events if e.transition == RAISED]
     later = [t - QUIET for t in raised if t >= QUIET]
     last = judged.decisions[-1]

@@ -10,34 +10,40 @@ from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from damadics_fd.commands.commission.errors import CommissioningError
 from damadics_fd.commands.commission.lag import (
     SIGN_GAIN,
-    STRIBECK,
     WIDTH,
     Lag,
     find_lag,
-    plug_per_pascal,
     trust,
+)
+from damadics_fd.commands.commission.regression import (
+    ONE,
+    TABLE,
+    K,
+    Mask,
+    S,
+    V,
+    add_viscous_prior,
+    blur_of,
+    prior_of,
+    regressor,
+    solve,
 )
 from damadics_fd.commands.commission.signals import Blocks, Signals, blocks
 from damadics_fd.core.record import Floats
 from damadics_fd.core.settings import Settings
 
-Mask = NDArray[np.bool_]
 BLOCK = 0.1  # s
 SAME_LAG = 0.003  # s
 LEAST = 20  # moving blocks each way
 MODEL_ERROR = 1e-3  # of the spring force over the stroke: the balance is no better than that
 WIDE, NARROW = (0.5, 0.2), (0.05, 0.03)  # prior of the plug force: in common, per node
-VISCOUS_STD = 0.3  # how well a data sheet's viscous friction is known, as a share
-MILD = 0.15  # viscous share of friction at the usual speed, give or take as much
 TABLE_X = np.r_[0.0:0.91:0.1, 0.99, 1.0]
 LOWEST, HIGHEST = 0.01, 10.0  # entries of plug_table
 NO_SPRING = 10.0  # strokes of preload that no spring has
-K, ONE, V, S, SLOW, LATE, TABLE = range(7)
 
 
 @dataclass(frozen=True)
@@ -84,17 +90,6 @@ class Balance:
         """Dry and viscous friction at the usual speed [N]."""
         v = self.settings.stroke * float(np.median(np.abs(self.v)))
         return self.friction + self.viscous * v
-
-
-@dataclass(frozen=True)
-class Fit:
-    """Hold one least-squares fit."""
-
-    theta: Floats
-    covariance: Floats
-    sigma: float
-    objective: float
-    left: Floats
 
 
 def find_balance(
@@ -166,13 +161,6 @@ def _directed(sheet: Settings, lag: Lag, given: Collection[str]) -> tuple[Settin
     return sheet.replace(air_to=air, flow_to=flow), undetermined
 
 
-def _blur(b: Blocks, use: Mask, s: Settings) -> float:
-    """Return the variance that noise of x1 puts into the velocity of a block [m2/s2]."""
-    thirds = np.abs(np.diff(b.x, 3))[use[:-3] & use[3:] & (b.index[3:] - b.index[:-3] == 3)]
-    noise = 1.4826 * float(np.median(thirds)) / np.sqrt(20.0) if len(thirds) else 0.0
-    return float(2.0 * (s.stroke * noise / (2.0 * b.width)) ** 2)
-
-
 def _enough(b: Blocks) -> Mask:
     use = b.moving
     up, down = int(np.sum(use & (b.v > 0.0))), int(np.sum(use & (b.v < 0.0)))
@@ -184,92 +172,6 @@ def _enough(b: Blocks) -> Mask:
             'needed: move it both ways'
         )
     return use
-
-
-def regressor(b: Blocks, s: Settings) -> tuple[Floats, Floats, Floats]:
-    """
-    Return what the balance of blocks is made of.
-
-    :param b: blocks.
-    :param s: settings.
-    :return: force with the plug force of the settings taken off [N]; columns of K, b, c, Fc,
-        Stribeck friction and lag of P1 - P2, shape (n, 6); hat functions times plug force.
-    """
-    air = 1.0 if s.air_to == 'close' else -1.0
-    flow = 1.0 if s.flow_to == 'open' else -1.0
-    gain = flow * plug_per_pascal(s, b.x)
-    plug = gain * b.dp
-    v = np.nan_to_num(b.v)
-    sign = np.sign(v)
-    columns = np.stack(
-        [
-            s.stroke * b.x,
-            np.ones(len(v)),
-            s.stroke * v,
-            sign,
-            sign * np.exp(-((v / STRIBECK) ** 2)),
-            gain * b.rate_dp,
-        ],
-        axis=1,
-    )
-    hats = np.clip(1.0 - np.abs(b.x[:, None] * 10.0 - np.arange(11)), 0.0, 1.0)
-    force = s.mass * s.gravity + air * s.area * b.ps - plug
-    return force, columns, plug[:, None] * hats
-
-
-def solve(
-    A: Floats,
-    y: Floats,
-    precision: Floats,
-    mean: Floats,
-    floor: float,
-    weights: Floats,
-    blur: float = 0.0,
-) -> Fit:
-    """
-    Fit by least squares with a prior; outliers count less.
-
-    :param A: columns, shape (n, p).
-    :param y: [N], shape (n,).
-    :param precision: inverse covariance of the prior, shape (p, p).
-    :param mean: of the prior, shape (p,).
-    :param floor: least standard deviation of the noise [N].
-    :param weights: weight of each row, shape (n,).
-    :param blur: variance of the noise in the column of the velocity, which would pull the
-        viscous friction to zero.
-    :return: the fit.
-    """
-    sigma, weight = max(float(np.std(y)), floor), weights
-    theta: Floats = mean
-    H, left = precision, y
-    for _ in range(6):
-        H = (A * weight[:, None]).T @ A / sigma**2
-        known = 1.0 / max(float(np.linalg.pinv(H)[V, V]), 1e-300)
-        H[V, V] -= min(blur * float(weight.sum()) / sigma**2, 0.999 * known)
-        H += precision
-        right = (A * weight[:, None]).T @ y / sigma**2 + precision @ mean
-        theta = np.asarray(np.linalg.solve(H, right), float)
-        left = y - A @ theta
-        spread = max(1.4826 * float(np.median(np.abs(left[weights > 0.3 * weights.max()]))), floor)
-        weight = weights * np.minimum(1.0, 3.0 * spread / np.maximum(np.abs(left), 1e-12))
-        sigma = max(float(np.sqrt(np.sum(weight * left**2) / np.sum(weight))), floor)
-    change = theta - mean
-    objective = float(np.sum(weight * left**2)) / sigma**2 + float(change @ precision @ change)
-    objective += 2.0 * len(y) * float(np.log(sigma))
-    return Fit(theta, np.asarray(np.linalg.inv(H), float), sigma, objective, left)
-
-
-def _prior(sheet: Settings, given: Collection[str], size: int) -> tuple[Floats, Floats]:
-    """Return precision and mean: weak for spring and dry friction, mild for the viscous one."""
-    KL = sheet.stiffness * sheet.stroke
-    std = np.array([1e3 * sheet.stiffness, 1e3 * KL, 1e9, 1e9, 0.02 * KL, 0.05])
-    mean = np.zeros(size)
-    if 'alpha1' in given:
-        mean[V] = sheet.alpha1 * sheet.mass
-        std[V] = VISCOUS_STD * max(mean[V], 1.0)
-    precision = np.zeros((size, size))
-    precision[:6, :6] = np.diag(1.0 / std**2)
-    return precision, mean
 
 
 def _plug(
@@ -284,32 +186,18 @@ def _plug(
     for _ in range(3):
         force, columns, hats = regressor(b, rows)
         A = np.concatenate([columns, hats], axis=1)[use]
-        precision, mean = _prior(sheet, given, A.shape[1])
+        precision, mean = prior_of(sheet, given, A.shape[1])
         table = np.full((11, 11), common**2) + np.eye(11) * per_node**2
         precision[TABLE:, TABLE:] = np.linalg.inv(table)
-        _viscous_prior(precision, mean, A, force[use], b.v[use], given)
+        add_viscous_prior(precision, mean, A, force[use], b.v[use], given)
         floor = MODEL_ERROR * s.stiffness * s.stroke
-        fit = solve(A, force[use], precision, mean, floor, trust(b.v[use]), _blur(b, use, s))
+        fit = solve(A, force[use], precision, mean, floor, trust(b.v[use]), blur_of(b, use, s))
         e_total = np.maximum(e_total * (1.0 + fit.theta[TABLE:]), 0.003)
         rows = _with_table(base, e_total)
         common, per_node = NARROW
     seen = np.histogram(b.x[use], np.linspace(-0.05, 1.05, 12))[0] > 0
     gain = float(np.mean(e_total[seen]))
     return rows, gain, float(np.std(e_total[seen] / gain))
-
-
-def _viscous_prior(
-    precision: Floats, mean: Floats, A: Floats, y: Floats, v: Floats, given: Collection[str]
-) -> None:
-    """Lean, where one speed cannot tell dry from viscous friction, on a mild viscous share."""
-    if 'alpha1' in given:
-        return
-    few = np.delete(A, [V, SLOW], axis=1)
-    theta = np.linalg.lstsq(few, y, rcond=None)[0]
-    speed = float(np.median(np.abs(A[:, V])))
-    total = abs(float(theta[S - 1])) + 1e-9  # the column of Fc has moved up by one
-    mean[V] = MILD * total / max(speed, 1e-9)
-    precision[V, V] = (max(speed, 1e-9) / (MILD * total)) ** 2
 
 
 def _with_table(base: Settings, e: Floats) -> Settings:
@@ -337,13 +225,13 @@ def _final(
     plugged = s.plug_diameter > 0.0
     if plugged:
         A = np.concatenate([columns, hats], axis=1)[use]
-    precision, mean = _prior(sheet, given, A.shape[1])
+    precision, mean = prior_of(sheet, given, A.shape[1])
     if plugged:
         table = np.full((11, 11), 0.01**2) + np.eye(11) * 0.005**2
         precision[TABLE:, TABLE:] = np.linalg.inv(table)
-    _viscous_prior(precision, mean, A, force[use], b.v[use], given)
+    add_viscous_prior(precision, mean, A, force[use], b.v[use], given)
     floor = MODEL_ERROR * s.stiffness * s.stroke
-    fit = solve(A, force[use], precision, mean, 0.2 * floor, trust(b.v[use]), _blur(b, use, s))
+    fit = solve(A, force[use], precision, mean, 0.2 * floor, trust(b.v[use]), blur_of(b, use, s))
     K_, offset, viscous, dry, slow = (float(v) for v in fit.theta[:5])
     origin = offset / (K_ * s.stroke) if K_ != 0.0 else np.inf
     preload = origin if s.air_to == 'close' else -1.0 - origin

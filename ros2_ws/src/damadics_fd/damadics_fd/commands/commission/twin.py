@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from damadics_fd.commands.commission.balance import regressor
 from damadics_fd.commands.commission.errors import CommissioningError
 from damadics_fd.commands.commission.monitor import Proposal
+from damadics_fd.commands.commission.regression import regressor
 from damadics_fd.commands.commission.signals import Blocks, Signals, blocks, gather
 from damadics_fd.commands.commission.valve_file import quoted, value_text
 from damadics_fd.core.identified import FaultFree
@@ -26,7 +26,7 @@ STRIBECK = 1e-3  # m/s
 VENTING = 0.55  # of the booster's opening, at most, where it vents
 STEP = 0.05  # of the stroke; smaller steps of the command do not count
 LOOK = 3.0  # s after a step
-TWIN = 'twin'
+TWIN, OPERATION = 'twin', 'operation'
 
 
 def write_twin(proposal: Proposal, path: Path, actuator: str = '') -> None:
@@ -53,6 +53,9 @@ def write_twin(proposal: Proposal, path: Path, actuator: str = '') -> None:
     for name, value in proposal.settings.to_dict().items():
         if value != usual[name]:
             lines.append(f'  {name}: {value_text(value)}')
+    lines.append(f'{OPERATION}:')
+    for name, value in operation(proposal).items():
+        lines.append(f'  {name}: {value_text(value)}')
     path.write_text('\n'.join(lines) + '\n', encoding='utf-8')
 
 
@@ -97,6 +100,27 @@ def twin(proposal: Proposal) -> dict[str, float]:
     }
 
 
+def operation(proposal: Proposal) -> dict[str, float]:
+    """
+    Return the pressures that the valve worked at, and the noise of its sensors.
+
+    :param proposal: what commission found.
+    :return: mean and swing (1.41 standard deviations) of P1 and P2 [Pa], and the standard
+        deviation of the noise of each signal: what its third differences show.
+    """
+    found: dict[str, float] = {}
+    for name in ('p1', 'p2', 'x1', 'ps'):
+        column = np.asarray(proposal.columns[name], float)
+        column = column[np.isfinite(column)]
+        thirds = np.abs(np.diff(column, 3))
+        noise = 1.4826 * float(np.median(thirds)) / np.sqrt(20.0)
+        if name.startswith('p') and name != 'ps':
+            swing = float(np.sqrt(max(2.0 * (float(np.var(column)) - noise**2), 0.0)))
+            found |= {name: float(np.mean(column)), f'{name}_swing': swing}
+        found[f'{name}_noise'] = noise
+    return {name: float(f'{value:.4g}') for name, value in found.items()}
+
+
 def breakaway(proposal: Proposal, b: Blocks) -> float:
     """
     Return the friction that the stem overcomes when it begins to move.
@@ -111,8 +135,10 @@ def breakaway(proposal: Proposal, b: Blocks) -> float:
     begins = np.flatnonzero(b.standing[:-2] & b.moving[2:] & (b.index[2:] - b.index[:-2] == 2))
     if not len(begins):
         return 0.0
-    borne = np.maximum(left[begins] * np.sign(b.v[begins + 2]), 0.0)
-    return float(np.median(borne))
+    # the stem breaks away within the block after, so the most is borne in either of the two
+    way = np.sign(b.v[begins + 2])
+    borne = np.maximum(left[begins] * way, left[begins + 1] * way)
+    return float(max(np.median(borne), 0.0))
 
 
 def capacities(b: Blocks, s: Settings) -> tuple[float, float]:
