@@ -25,6 +25,7 @@ from damadics_fd.bag.mcap.records import HEAD, MAGIC
 from damadics_fd.bag.salvage import salvage
 from damadics_fd.commands import recover, verify
 from damadics_fd.commands.replay import replay
+from damadics_fd.commands.replay.bags import Plan, warm_up
 
 from .bag_support import needs_messages, simulated
 from .test_conformance import Maker
@@ -194,6 +195,7 @@ def judge_commands(
 
 
 def fuzz(folder: Path, seed: int, count: int) -> None:
+    warm_up([Plan('paper')])  # no mutation pays for what is compiled once
     rng = random.Random(seed)
     originals = [(path.name, path.read_bytes(), messages(path)) for path in seeds(folder)]
     for number in range(count):

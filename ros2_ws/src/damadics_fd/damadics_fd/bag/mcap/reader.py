@@ -26,7 +26,7 @@ from damadics_fd.bag.mcap.records import (
     parse_attachment,
     parse_metadata,
 )
-from damadics_fd.bag.mcap.search import BEGIN, find_records, follows
+from damadics_fd.bag.mcap.search import BEGIN, KNOWN, find_records, follows
 from damadics_fd.bag.mcap.summary import read_summary
 from damadics_fd.bag.mcap.unpack import open_plain
 from damadics_fd.bag.mcap.wellformed import fields_end, well_formed
@@ -34,7 +34,6 @@ from damadics_fd.bag.messages import Batch, MessageFile
 
 LOOSE = 1 << 20  # [B] handled at a time where there are no chunks
 BLOCK = 1 << 24  # [B] of the file checked at a time
-KNOWN = 0x10  # opcodes from here on belong to later versions and other programs
 
 
 class _Found(NamedTuple):
