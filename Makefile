@@ -8,6 +8,7 @@ ENV := source ./env.sh
 BUILT := ros2_ws/install/.built
 COMPILED := ros2_ws/install/.compiled
 READERS := tools/npm/node_modules/.package-lock.json
+FOREIGN := tests/connect/foreign/node_modules/.package-lock.json
 SOURCES := $(shell find ros2_ws/src -type f -not -name '*.pyc' -not -path '*/__pycache__/*' \
 	-not -path '*/test/*' -not -path '*/.pytest_cache/*')
 
@@ -25,7 +26,7 @@ dashboard: $(BUILT) ## a simulated valve and the web page at http://127.0.0.1:80
 demo-plant: $(BUILT) ## a simulated plant behind OPC UA: a fault, and who hears of it when
 	@$(ENV) && ros2 run damadics_bringup demo_plant $(ARGS)
 
-test: $(COMPILED) $(READERS) ## run all tests
+test: $(COMPILED) $(READERS) $(FOREIGN) ## run all tests
 	@$(ENV) && tools/test.sh $(ARGS)
 
 report: $(BUILT) ## the benchmark's 44 scenarios x all detectors: docs/results/ (minutes; more: SEEDS=20)
@@ -52,6 +53,11 @@ $(READERS): tools/npm/package-lock.json
 	@if command -v npm > /dev/null; then \
 		echo 'Setting up the readers of Foxglove and Lichtblick ...'; npm ci --silent --prefix tools/npm; \
 	else echo 'npm is not installed: bags are not checked with the readers of Foxglove'; fi
+
+$(FOREIGN): tests/connect/foreign/package-lock.json
+	@if command -v npm > /dev/null; then \
+		echo 'Setting up a second OPC UA stack ...'; npm ci --silent --prefix tests/connect/foreign; \
+	else echo 'npm is not installed: our OPC UA server is not read with node-opcua'; fi
 
 fuzz: $(BUILT) ## 6000 mutations of bags by a new seed (another: FUZZ_SEED=1 FUZZ_COUNT=100)
 	@$(ENV) && python -m pytest -s -m slow -k thousands_of_mutations \
@@ -82,4 +88,4 @@ licences: $(BUILT) ## the licence of every installed package
 	@$(ENV) && python tools/licences.py
 
 clean: ## remove everything that was built
-	rm -rf .venv docs/_build tools/npm/node_modules ros2_ws/build ros2_ws/install ros2_ws/log
+	rm -rf .venv docs/_build tools/npm/node_modules tests/connect/foreign/node_modules ros2_ws/build ros2_ws/install ros2_ws/log

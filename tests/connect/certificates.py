@@ -12,7 +12,7 @@ from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 
 def make_certificate(folder: Path, name: str, uri: str) -> None:
-    """Write NAME.der and NAME.pem: a certificate that signs itself, and its key."""
+    """Write NAME.der, NAME.crt and NAME.pem: a certificate that signs itself, and its key."""
     key = rsa.generate_private_key(65537, 2048)
     subject = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, name)])
     now = datetime.now(UTC)
@@ -39,6 +39,7 @@ def make_certificate(folder: Path, name: str, uri: str) -> None:
         .sign(key, hashes.SHA256())
     )
     (folder / f'{name}.der').write_bytes(certificate.public_bytes(serialization.Encoding.DER))
+    (folder / f'{name}.crt').write_bytes(certificate.public_bytes(serialization.Encoding.PEM))
     (folder / f'{name}.pem').write_bytes(
         key.private_bytes(
             serialization.Encoding.PEM,

@@ -9,7 +9,8 @@ import httpx
 import pytest
 from connect.detectors import Detectors
 from connect.servers import free_port, listens, wait_for
-from damadics_msgs.msg import FaultEvent
+from damadics_fd.ros import qos
+from damadics_msgs.msg import FaultEvent, FaultFlag, FleetLayout, FleetStatus
 from prometheus_client.parser import text_string_to_metric_families
 
 pytestmark = pytest.mark.ros
@@ -182,3 +183,29 @@ def test_silence_of_a_detector_is_not_health(served):
     )
     families = {f.name: f for f in text_string_to_metric_families(client.get('/metrics').text)}
     assert {s.value for s in families['damadics_monitored'].samples} == {0.0}
+
+
+def test_valves_of_a_fleet_are_told_from_its_status_alone(served):
+    client, detectors, _ = served
+    node = detectors.node
+    layout = node.create_publisher(FleetLayout, '/fleet/layout', qos.latched(1))
+    status = node.create_publisher(FleetStatus, '/fleet/status', qos.latched(1))
+    names = ['/unit/lv201', '/unit/lv202']
+    layout.publish(FleetLayout(version=7, valve=names, actuator=['A', 'B'], area=['Unit', 'Unit']))
+    told = FleetStatus(layout=7, valve=[0, 1, 9], fault=[True, False, True], level=[3, 0, 3])
+    told.state = [FaultFlag.STATE_ALARM, FaultFlag.STATE_HEALTHY, FaultFlag.STATE_ALARM]
+    told.residual, told.threshold, told.ratio = [2.0, 0.1, 9.0], [1.0] * 3, [2.0, 0.1, 9.0]
+    told.age, told.progress, told.since = [0.1] * 3, [1.0] * 3, [0] * 3
+    told.cause = ['friction_up', '', 'no such valve']
+
+    def valves() -> dict[str, dict]:
+        status.publish(told)
+        return {each['valve']: each for each in client.get('/api/fleet').json()}
+
+    assert wait_for(lambda: 'unit/lv201' in valves(), 10.0, 0.3)
+    found = valves()
+    assert (found['unit/lv201']['state'], found['unit/lv201']['cause']) == ('alarm', 'friction_up')
+    assert found['unit/lv202']['state'] == 'healthy' and found['unit/lv202']['area'] == 'Unit'
+    assert not any('no such valve' in str(each) for each in found.values())
+    silent = lambda: {v['valve']: v for v in client.get('/api/fleet').json()}  # noqa: E731
+    assert wait_for(lambda: silent()['unit/lv202']['state'] == 'not_monitored', 10.0, 0.2)

@@ -154,6 +154,19 @@ def test_a_lost_server_is_silence_at_once_and_comes_back_without_a_person(connec
     assert 'lv0' in c.values()['Last gap']
 
 
+def test_a_server_that_is_read_gives_the_same_samples(connect, serve):
+    server = serve(1)
+    c = connect({'server': url(server), 'poll': True, 'period': 0.2, 'valves': {'lv0': valve(0)}})
+    assert c.wait(lambda: len(c.samples['lv0']) > 2), c.log()
+    now = time.time_ns() // 1000 * 1000
+    when = np.datetime64(now, 'ns').astype('datetime64[us]').item().isoformat() + '+00:00'
+    server.tell(f'LV0.PV 0.75 Double 0 {when}')
+    assert c.wait(lambda: any(m.x1 == 0.75 for m in c.samples['lv0']))
+    first = next(m for m in c.samples['lv0'] if m.x1 == 0.75)
+    assert stamps([first])[0] == now and first.p1 == pytest.approx(3.5e6)
+    assert (np.diff(stamps(c.samples['lv0'])) > 0).all()
+
+
 def test_many_valves_in_blocks_every_change_with_its_time(connect, serve):
     server = serve(20, '--rate', '1', '--fast', '2')
     valves = {f'lv{n}': valve(n, period=1.0 if n < 20 else 0.02) for n in range(22)}

@@ -106,8 +106,9 @@ def why(problem: BaseException) -> str:
     number = getattr(code, 'value', code)
     if isinstance(number, int) and number in REMEDIES:
         return REMEDIES[number]
-    if isinstance(problem.__cause__, OSError):
-        return why(problem.__cause__)
+    behind = problem.__cause__ or problem.__context__  # the client raises its own "from None"
+    if isinstance(behind, OSError) and behind is not problem:
+        return why(behind)
     if isinstance(problem, ssl.SSLError):
         return f'the certificate of the broker is refused: {problem.reason}: give tls.ca'
     if isinstance(problem, ConnectionRefusedError):
