@@ -265,7 +265,7 @@ def explain(event: Event, table: CauseTable, tag: str) -> Event:
     :param tag: of the actuator.
     :return: the event with text and advice of its cause; its class already counts the cause.
     """
-    if event.cause in ('', 'none'):
+    if event.cause == 'none' or event.cause not in table.causes:
         return event
     cause = table[event.cause]
     text, advice = cause.describe(tag, event.strength, event.spread, event.confidence)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from damadics_fd.core.approximator.estimator import Estimator
 from damadics_fd.core.approximator.state import Estimate
+from damadics_fd.core.judgement import Judgement
 from damadics_fd.core.quality import Refused
 from damadics_fd.core.record import Array, Floats, Ints, Plain, Saved
 from damadics_fd.core.scada.estimator import ScadaEstimator
@@ -20,6 +21,7 @@ class Estimating(Protocol):
     """The first half of a monitor, a node of its own in ROS: samples in, estimates out."""
 
     settings: Settings
+    stride: int  # samples after which to ask for its judgement; 0: it has none
     refused: Refused | None  # the last refusal
 
     def update(
@@ -55,6 +57,10 @@ class Estimating(Protocol):
 
     def reset(self) -> None:
         """Forget everything."""
+
+    @property
+    def judgement(self) -> Judgement | None:
+        """Return what the latest fault is taken for; None where that is not its task."""
 
     @property
     def status(self) -> str:

@@ -6,13 +6,16 @@ from collections.abc import Mapping, Sequence
 from typing import Protocol, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from damadics_fd.core.approximator.state import Estimate
+from damadics_fd.core.decision.alarm import RAISED
 from damadics_fd.core.decision.detector import Detector
 from damadics_fd.core.decision.events import Decision, Event
 from damadics_fd.core.estimating import Estimating, estimator_for
+from damadics_fd.core.judgement import Judgement, with_judgements
 from damadics_fd.core.quality import REASONS, Refused
-from damadics_fd.core.record import Plain, Saved
+from damadics_fd.core.record import Array, Floats, Ints, Plain, Saved
 from damadics_fd.core.result import Columns, Result, contiguous, events_in, hold_refused
 from damadics_fd.core.sample import Sample
 from damadics_fd.core.settings import Settings
@@ -99,6 +102,8 @@ class Chain:
         self.settings = settings
         self.estimator = estimator or estimator_for(settings)
         self.detector = detector or Detector(settings, classes)
+        self._judgement: Judgement | None = None  # the latest that was told
+        self._latest: Event | None = None  # the latest alarm
 
     def update(self, sample: Sample) -> Decision | Refused:
         """
@@ -124,10 +129,40 @@ class Chain:
         estimates = np.empty(len(stamp), Estimate.dtype())
         decisions = np.empty(len(stamp), Decision.dtype())
         before = self.detector.decision
-        self.estimator.run(stamp, signals, reason, estimates)
+        latest, looks = self._latest, self._estimate(stamp, signals, reason, estimates)
         self.detector.judge(reason, estimates, decisions)
         hold_refused(reason, stamp, estimates, decisions, before)
-        return Result(reason, estimates, decisions, self.estimator, self.detector)
+        result = Result(reason, estimates, decisions, self.estimator, self.detector, looks, latest)
+        if looks or self.estimator.stride:
+            self._note(result.events)
+        return result
+
+    def _estimate(
+        self, stamp: Ints, signals: Sequence[Floats], reason: NDArray[np.uint8], estimates: Array
+    ) -> tuple[Judgement, ...]:
+        """Estimate a column; return the judgements that bring something new."""
+        stride = self.estimator.stride
+        if not stride:
+            self.estimator.run(stamp, signals, reason, estimates)
+            return ()
+        looks = []
+        for first in range(0, len(stamp), stride):
+            piece = slice(first, first + stride)
+            self.estimator.run(
+                stamp[piece],
+                [signal[piece] for signal in signals],
+                reason[piece],
+                estimates[piece],
+            )
+            judgement = self.estimator.judgement
+            if judgement is not None and judgement is not self._judgement:
+                looks.append(judgement)
+                self._judgement = judgement
+        return tuple(looks)
+
+    def _note(self, events: Sequence[Event]) -> None:
+        raised = [event for event in events if event.transition == RAISED]
+        self._latest = raised[-1] if raised else self._latest
 
     def events(self, columns: Columns) -> list[Event]:
         """
@@ -145,13 +180,18 @@ class Chain:
         for first in range(0, len(stamp), PIECE):
             piece = slice(first, first + PIECE)
             n = len(stamp[piece])
-            self.estimator.run(
+            latest = self._latest
+            looks = self._estimate(
                 stamp[piece], [signal[piece] for signal in signals], reason[:n], estimates[:n]
             )
             done = 0
+            told: list[Event] = []
             while done < n:
                 done, kept = self.detector.judge(reason[:n], estimates[:n], decisions, False, done)
-                events += events_in(decisions[:kept])
+                told += events_in(decisions[:kept])
+            told = with_judgements(told, looks, latest) if self.estimator.stride else told
+            self._note(told)
+            events += told
         return events
 
     def learned(self) -> Saved:

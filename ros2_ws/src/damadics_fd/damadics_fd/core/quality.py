@@ -114,8 +114,8 @@ def signal_fault(c: Settings, index: int, value: float) -> int:
     """
     Judge one signal by its place in SIGNALS.
 
-    Paper mode needs cv and x1, monitor and scada mode also p1 and p2, monitor mode ps; t1 and
-    flow may be missing, only an infinite value, the mark of a corrupt sample, is refused there.
+    All modes need cv and x1, mode monitor also p1, p2 and ps. What is not needed may be NaN; only
+    an infinite value, the mark of a corrupt sample, is refused there.
 
     :param c: settings record.
     :param index: place in SIGNALS.

@@ -12,6 +12,7 @@ from damadics_fd.core.decision.alarm import RAISED
 from damadics_fd.core.decision.detector import Detector
 from damadics_fd.core.decision.events import Decision, Event
 from damadics_fd.core.estimating import Estimating
+from damadics_fd.core.judgement import Judgement, with_judgements
 from damadics_fd.core.record import Array, Floats, Ints
 from damadics_fd.core.sample import SIGNALS
 
@@ -32,6 +33,8 @@ class Result:
     decisions: Array  # rows of `Decision`
     estimator: Estimating  # with the state after the last sample
     detector: Detector
+    looks: tuple[Judgement, ...] = ()  # what faults were taken for, in order of time
+    latest: Event | None = None  # the alarm that stood before
 
     @property
     def accepted(self) -> NDArray[np.bool_]:
@@ -59,7 +62,8 @@ class Result:
 
         :return: events in order of time.
         """
-        return events_in(self.decisions[self.decisions['transitions'] != 0])
+        told = events_in(self.decisions[self.decisions['transitions'] != 0])
+        return with_judgements(told, self.looks, self.latest)
 
     @property
     def detections(self) -> list[Event]:

@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 from damadics_msgs.msg import Estimate as EstimateMessage
-from damadics_msgs.msg import Measurement, OperatorAction
+from damadics_msgs.msg import Isolation, Measurement, OperatorAction
 from damadics_msgs.srv import Relearn
 
 from damadics_fd.core.approximator.state import Estimate
@@ -20,6 +20,7 @@ from damadics_fd.core.decision.alarm import (
     OUT_OF_SPECIFICATION,
 )
 from damadics_fd.core.estimating import estimator_for
+from damadics_fd.core.judgement import Judgement
 from damadics_fd.core.quality import Reason, Refused
 from damadics_fd.core.sample import Sample
 from damadics_fd.nodes.frozen_position import FrozenPosition
@@ -29,6 +30,7 @@ from damadics_fd.nodes.operator import OperatorActions
 from damadics_fd.nodes.reference_keeper import ReferenceKeeper
 from damadics_fd.ros import qos
 from damadics_fd.ros.arguments import check_node_arguments
+from damadics_fd.ros.conversions import judgement_message
 from damadics_fd.ros.diagnostics import Level, Report
 from damadics_fd.ros.raw import EstimateEncoder, any_sample
 from damadics_fd.ros.spin import spin
@@ -81,6 +83,9 @@ class EstimatorNode(MonitoringNode):
         self._refused_at = -math.inf  # monotonic time of the last refused sample [s]
         self._frozen = FrozenPosition()
         self._publisher = made.publisher(EstimateMessage, 'estimate', qos.SAMPLES)
+        self._judgement: Judgement | None = None
+        if self._core.stride:
+            self._isolation = made.publisher(Isolation, 'isolation', qos.FLAG)
         self._actions = OperatorActions(self, made, self.actuator)
         made.service(Relearn, 'relearn', self._relearn)
         self._reference = ReferenceKeeper(
@@ -100,6 +105,7 @@ class EstimatorNode(MonitoringNode):
             return
         self._progress = estimate.progress
         self._give(estimate, tag)
+        self._tell_judgement(tag)
         phase = self._core.phase
         if phase != self._last:
             learned = phase == 'monitor' and self._last.startswith('learn')
@@ -116,6 +122,13 @@ class EstimatorNode(MonitoringNode):
                 taker.sent(estimate.stamp)
             self._publisher.publish(self._encoder.encode(estimate, tag))
         self._joint.hand(estimate, tag)
+
+    def _tell_judgement(self, tag: str) -> None:
+        """Publish what a fault is taken for, where this estimator judges that, when it changes."""
+        judgement = self._core.judgement
+        if judgement is not None and judgement is not self._judgement:
+            self._judgement = judgement
+            self._isolation.publish(judgement_message(judgement, tag))
 
     def _relearn(self, request: Relearn.Request, response: Relearn.Response) -> Relearn.Response:
         if self.settings.mode == 'paper':

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Convert between messages and the core's tuples; the only place that knows both."""
 
+import math
+
 from builtin_interfaces.msg import Time
 from damadics_msgs.msg import Estimate as EstimateMessage
 from damadics_msgs.msg import FaultEvent, FaultFlag, Isolation, Measurement
@@ -10,6 +12,7 @@ from std_msgs.msg import Header
 from damadics_fd.core.approximator.state import Estimate
 from damadics_fd.core.decision.alarm import CHANGED, RAISED
 from damadics_fd.core.decision.events import Decision, Event
+from damadics_fd.core.judgement import Judgement
 from damadics_fd.core.sample import Sample
 from damadics_fd.core.stamps import SECOND
 
@@ -144,4 +147,28 @@ def isolation_message(event: Event, frame_id: str, mode: str, own: bool) -> Isol
     message.header.frame_id = frame_id
     set_stamp(message.header.stamp, event.stamp)
     set_stamp(message.onset, event.onset)
+    return message
+
+
+def judgement_message(judgement: Judgement, frame_id: str) -> Isolation:
+    """
+    Return the message of what an estimator takes a fault for.
+
+    :param judgement: of the estimator.
+    :param frame_id: tag of the actuator.
+    :return: the message.
+    """
+    message = Isolation(
+        occurrence=judgement.occurrence,
+        test=judgement.test,
+        found_by=judgement.found_by,
+        candidate=list(judgement.candidates),
+        confidence=list(judgement.confidence),
+        strength=judgement.strength,
+        deviation=math.nan,
+        text=judgement.text,
+    )
+    message.header.frame_id = frame_id
+    set_stamp(message.header.stamp, judgement.stamp)
+    set_stamp(message.onset, judgement.onset)
     return message

@@ -2,14 +2,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """Mode scada on valves that are not the benchmark's, by a generator of its own."""
 
+import json
+
 import numpy as np
 import pytest
+from damadics_fd.commands.commission import command as commission
+from damadics_fd.commands.replay import replay
 from damadics_fd.core.identified import OK, REFUSED, FaultFree
 from damadics_fd.core.scada.estimator import scada_settings
 from damadics_fd.core.scada.laws.identify import identify
 from damadics_fd.core.scada.monitor import ScadaMonitor
 from damadics_fd.core.scada.state import Reference
 from damadics_fd.core.settings import Settings
+from fluids import control_valve
 from foreign_valve import VAPOUR, WATER, Kind, capacity, load, mass_flow, record
 
 SHEET = Settings.for_mode('scada')
@@ -33,12 +38,20 @@ def monitor_of(kind):
     return lambda: ScadaMonitor(settings, reference)
 
 
+def spike_in_two_rows(columns, at):
+    """Put a wrong position and, with the next sample, a wrong flow into a recording."""
+    for i in at:
+        columns['x1'][i] += 0.2
+        columns['flow'][i + 1] *= 0.7
+
+
 @pytest.mark.parametrize('name', KINDS)
 def test_a_foreign_valve_is_learned_and_its_faults_are_found(name):
     kind = KINDS[name]
     fresh = monitor_of(kind)
-    quiet = fresh().run(record(kind, load(HOURS, 2), 2))
-    assert not quiet['alarm'].any()
+    quiet = record(kind, load(HOURS, 2), 2)
+    spike_in_two_rows(quiet, at=range(1000, HOURS, 1000))
+    assert not fresh().run(quiet)['alarm'].any()
     for fault, strength, within in ((19, 0.25, 5), (11, 0.5, 5), (13, 0.25, 5)):
         found = fresh()
         trace = found.run(record(kind, load(AT + 300, 3), 3, fault, strength, AT))
@@ -51,9 +64,21 @@ def test_a_foreign_valve_is_learned_and_its_faults_are_found(name):
             assert fault in isolation.candidates
 
 
+def test_a_slow_drift_is_followed_and_told():
+    kind = Kind(kv=480.0, trim='linear')
+    found = monitor_of(kind)()
+    n = 10 * 3600
+    day = record(kind, load(n, 5), 5)
+    share = np.minimum(np.arange(n) / (8.0 * 3600.0), 1.0)
+    day['x1'] = np.clip(day['x1'] + 0.009 * share, 0.0, 1.0)
+    day['flow'] *= 1.0 + 0.09 * share
+    assert not found.run(day)['alarm'].any()
+    assert len(found.drifts()) == 2
+    assert 'the stem has drifted by +0.' in found.drifts()[0]
+
+
 @pytest.mark.parametrize('p2', [2.6e6, 0.4e6])
 def test_the_generator_flows_as_iec_60534_says(p2):
-    control_valve = pytest.importorskip('fluids.control_valve', reason='pip install fluids')
     kind = Kind(kv=100.0, trim='linear')
     x, p1 = np.array([0.4]), np.array([3.5e6])
     flow = mass_flow(kind, x, p1, np.array([p2]))[0]
@@ -91,6 +116,35 @@ def test_what_cannot_be_a_valve_that_works_is_refused(what, said):
     found = identify([FaultFree('day', day)], SHEET)
     assert found.verdict == REFUSED
     assert said in found.report[0]
+
+
+def table(path, columns):
+    names = ('cv', 'x1', 'p1', 'p2', 't1', 'flow')
+    rows = np.column_stack([columns['stamp'] * 1e-9, *(columns[name] for name in names)])
+    np.savetxt(path, rows, delimiter=',', header=','.join(('t', *names)), comments='', fmt='%.9g')
+    return str(path)
+
+
+def test_a_valve_is_commissioned_from_a_table_and_its_fault_named(tmp_path, capsys):
+    kind = Kind(kv=60.0, trim='linear')
+    day = table(tmp_path / 'day.csv', record(kind, load(HOURS // 2, 1), 1))
+    kept = tmp_path / 'lv7'
+    words = [day, '--mode', 'scada', '--actuator', 'LV7', '--reference', str(kept)]
+    assert commission.main([*words, '--out', str(tmp_path / 'lv7.yaml')]) == 0
+    said = capsys.readouterr().out
+    for line in ('stem: learned at', 'flow: liquid, identified', 'Kv ', 'found within'):
+        assert line in said
+    assert 'verdict: ok' in said
+    later = table(tmp_path / 'later.csv', record(kind, load(AT + 300, 3), 3, 19, 0.25, AT))
+    out = tmp_path / 'found.json'
+    words = [later, '--mode', 'scada', '--reference', str(kept), '--out', str(out)]
+    assert replay.main(words) == 0
+    [found] = json.loads(out.read_text())[0]['detections']
+    assert AT <= found['t'] <= AT + 5
+    assert found['test'].startswith('r2/')
+    assert 'f19' in found['candidates']
+    assert found['cause'] == ' or '.join(found['candidates'])
+    assert 'flow sensor' in found['text']
 
 
 def test_cv_and_position_alone_show_the_stem():

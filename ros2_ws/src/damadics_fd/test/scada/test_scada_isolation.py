@@ -5,8 +5,9 @@
 import numpy as np
 import pytest
 from damadics_fd.core.scada.learning import learn
-from damadics_fd.core.scada.monitor import ScadaMonitor, scada_samples
+from damadics_fd.core.scada.monitor import ScadaMonitor
 from damadics_fd.core.scada.naming.isolation import GROUPS, NAMES, group_of
+from damadics_fd.core.scada.samples import scada_samples
 from damadics_fd.core.scada.settings import ScadaSettings
 
 plant = pytest.importorskip('damadics_plant')

@@ -9,9 +9,10 @@ import math
 import numpy as np
 import pytest
 from damadics_fd.core.approximator.estimator import Estimator
+from damadics_fd.core.decision.alarm import CHANGED
 from damadics_fd.core.estimating import estimator_for
 from damadics_fd.core.modes import PHASE_LEARN_PHI, PHASE_MONITOR
-from damadics_fd.core.monitor import run
+from damadics_fd.core.monitor import Chain, run
 from damadics_fd.core.quality import Refused
 from damadics_fd.core.scada.estimator import ScadaEstimator
 from damadics_fd.core.settings import Settings
@@ -40,6 +41,37 @@ def test_the_alarm_goes_through_the_detector(result):
     assert result.decisions['fault'][-1]
     assert not result.decisions['fault'][:900].any()
     assert 'f11 servomotor spring' in result.estimator.status
+
+
+def test_events_tell_the_test_the_onset_and_later_the_cause(columns, result):
+    raised = result.detections[0]
+    assert raised.test.startswith('r1/')
+    assert f'control-room test {raised.test} at ' in raised.text
+    assert 898 <= raised.onset * 1e-9 <= 902
+    assert not raised.cause
+    named = result.events[-1]
+    assert named.transition == CHANGED
+    assert named.occurrence == raised.occurrence
+    assert named.candidates == ('f11',)
+    assert named.cause == 'f11'
+    assert 0.3 < named.strength < 0.7
+    assert 0.5 < named.confidence <= 1.0
+    assert 'f11 servomotor spring' in named.text
+    chain = Chain(SETTINGS)
+    pieces = [{name: v[i : i + 300] for name, v in columns.items()} for i in range(0, 1100, 300)]
+    again = [event for piece in pieces for event in chain.events(piece)]
+    assert [(e.transition, e.test, e.cause) for e in again] == [
+        (e.transition, e.test, e.cause) for e in result.events
+    ]
+
+
+def test_another_sample_period_than_the_learned_one_is_told(columns, result):
+    estimator = estimator_for(SETTINGS)
+    estimator.restore(result.estimator.learned())
+    rare = {name: values[::5] for name, values in columns.items()}
+    assert not run(rare, SETTINGS, estimator=estimator).detections
+    assert 'samples come every 5 s, but every 1 s were learned from' in estimator.status
+    assert not estimator.monitoring
 
 
 def test_sample_by_sample_gives_the_same(columns, result):

@@ -13,11 +13,14 @@ from damadics_fd.core.scada.judging.cusum import TEST_NAMES, siegmund_limit
 from damadics_fd.core.scada.judging.limits import cusum_maximum
 from damadics_fd.core.scada.learning import LearningError, learn
 from damadics_fd.core.scada.monitor import ScadaMonitor
+from damadics_fd.core.scada.samples import scada_samples
 from damadics_fd.core.scada.settings import ScadaSettings
+from damadics_fd.core.scada.state import LAW
 from damadics_plant import Fault, load_scenario, simulate
 
 DATA = Path(__file__).resolve().parents[6] / 'shared' / 'data'
 T, CV, X, P1, P2, T1, F = range(7)
+COLUMNS = ('stamp', 'cv', 'x1', 'p1', 'p2', 't1', 'flow')
 QUARTER = ScadaSettings(learn_s=900.0)
 
 
@@ -225,3 +228,21 @@ def test_an_unlearned_step_of_cv_is_no_fault_and_hides_none_for_long(fault, foun
         assert trace['ratio'].max() < 0.9
     else:
         assert fault[0][2] <= alarms[0] <= found
+
+
+@pytest.mark.parametrize(('first', 'step'), [(0, 2), (1, 2), (0, 3)])
+def test_rare_samples_of_a_quick_valve_are_no_wrong_scale(lublin, first, step):
+    rows = lublin[first::step]
+    reference = learn(rows, dataclasses.replace(QUARTER, learn_from_s=0.0, learn_s=1200.0))
+    assert abs(reference['stem_law']['gain'][0] - 1.0) < 0.1
+
+
+def test_a_flow_that_the_stated_kv_cannot_give_is_refused():
+    run = simulate('nominal', rate=1.0, duration=1000.0, noise=True, seed=11)
+    rows = scada_samples({name: np.asarray(run[name]) for name in COLUMNS})
+    stated = dataclasses.replace(QUARTER, kv_stated=True)
+    learn(rows, stated)
+    rows[:, F] *= 0.75
+    with pytest.raises(LearningError, match=r'the flow is 0\.7\d of that of the stated Kv 120'):
+        learn(rows, stated)
+    assert learn(rows, QUARTER)['flow_kind'][0] == LAW

@@ -28,7 +28,7 @@ from damadics_fd.figures.valve_signature import ForceMap, force_over_position
 NO_RESULT = 0.9  # share of refused samples from which on nothing was monitored
 NEEDED = {
     'paper': ('cv', 'x1'),
-    'scada': ('cv', 'x1', 'p1', 'p2'),
+    'scada': ('cv', 'x1'),
     'monitor': ('cv', 'x1', 'p1', 'p2', 'ps'),
 }
 PIECE = 8192  # rows judged at once: they fit the cache, and calls cost nothing against them

@@ -12,7 +12,7 @@ from damadics_fd.core.decision.events import Event
 from damadics_fd.core.stamps import SECOND
 
 FAULT, NONE, NOT_MONITORED, FAILED = 'fault', 'none', 'not monitored', 'failed'  # verdicts
-MONITORING = 'monitoring'  # status of an estimator that judges
+MONITORING = 'monitoring'  # so begins the status of an estimator that judges
 
 
 class Detection(TypedDict):
@@ -26,7 +26,9 @@ class Detection(TypedDict):
     level: int
     occurrence: int
     onset: float | None
+    test: str
     cause: str
+    candidates: list[str]
     confidence: float | None
     strength: float | None
     spread: float | None
@@ -71,7 +73,7 @@ class Outcome:
             return FAILED
         if self.detections:
             return FAULT
-        return NONE if self.status == MONITORING else NOT_MONITORED
+        return NONE if self.status.startswith(MONITORING) else NOT_MONITORED
 
     def content(self) -> dict[str, object]:
         """Return everything, the verdict included."""
@@ -98,7 +100,9 @@ def evidence(event: Event, zero: int) -> Detection:
         'level': event.level,
         'occurrence': event.occurrence,
         'onset': (event.onset - zero) / SECOND if event.onset else None,
+        'test': event.test,
         'cause': event.cause,
+        'candidates': list(event.candidates),
         'confidence': _finite(event.confidence),
         'strength': _finite(event.strength),
         'spread': _finite(event.spread),
@@ -112,7 +116,12 @@ def collect(detections: list[Detection], events: Iterable[Event], zero: int) -> 
         present = evidence(event, zero)
         if event.transition == RAISED:
             detections.append(present)
-        elif event.cause and detections and detections[-1]['occurrence'] == event.occurrence:
+            continue
+        told = event.cause or event.test
+        if told and detections and detections[-1]['occurrence'] == event.occurrence:
             last = detections[-1]
             last['cause'], last['confidence'] = present['cause'], present['confidence']
             last['strength'], last['spread'] = present['strength'], present['spread']
+            last['candidates'] = present['candidates']
+            if event.test:
+                last['text'] = present['text']

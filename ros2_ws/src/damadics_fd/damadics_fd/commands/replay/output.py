@@ -30,7 +30,9 @@ COLUMNS = {  # of a row and their types in Parquet
     'level': 'int64',
     'occurrence': 'int64',
     'onset': 'float64',
+    'test': 'string',
     'cause': 'string',
+    'candidates': 'string',
     'confidence': 'float64',
     'strength': 'float64',
     'spread': 'float64',
@@ -108,7 +110,8 @@ def write_outcomes(outcomes: Sequence[Outcome], path: Path) -> None:
     Write results to a file, with one content in every format.
 
     JSON is a list with one object per recording. CSV and Parquet have one row per detection, and
-    one with an empty `t` for a recording without; `refused` and `problems` are JSON in a cell.
+    one with an empty `t` for a recording without; `refused`, `problems` and `candidates` are JSON
+    in a cell.
 
     :param outcomes: what became of each recording.
     :param path: file; its suffix chooses the format.
@@ -141,4 +144,8 @@ def _rows(outcome: Outcome) -> list[dict[str, object]]:
         'problems': json.dumps(outcome.problems, ensure_ascii=False),
     }
     del about['detections']
-    return [about | detection for detection in outcome.detections] or [about]
+    found = [
+        {**detection, 'candidates': json.dumps(detection['candidates'])}
+        for detection in outcome.detections
+    ]
+    return [about | detection for detection in found] or [about]

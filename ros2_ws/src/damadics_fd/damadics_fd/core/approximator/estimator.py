@@ -40,6 +40,9 @@ class Estimator(Intake):
     'not_finite: x1 = nan'
     """
 
+    stride = 0
+    judgement = None
+
     def __init__(self, settings: Settings) -> None:
         super().__init__(settings)
         self.state = State.rows()

@@ -24,6 +24,7 @@ from damadics_fd.core.record import Record
 from damadics_fd.core.signature.state import CAUSES, known
 
 STUCK = 5.0  # s without motion that are worth a word in the text of an alarm
+STATISTIC = 1.0  # threshold where the residual is a statistic over its limit: mode scada
 ADVICE = {
     NORMAL: '',
     MAINTENANCE_REQUIRED: 'acknowledge; plan an inspection of packing, spring and sensors',
@@ -52,6 +53,8 @@ class Event:
     spread: float = math.nan  # its standard deviation
     text: str = ''
     advice: str = ''
+    test: str = ''  # that raised it, where the monitor has several
+    candidates: tuple[str, ...] = ()  # causes, the likeliest first
 
     @property
     def name(self) -> str:
@@ -133,10 +136,13 @@ def _text(transition: int, d: Decision, duration: float) -> str:
     name = TRANSITIONS[transition].replace('_', ' ')
     unnumbered = transition in (SHELVED, UNSHELVED, NEAR_MISS) or not d.occurrence
     number = '' if unnumbered else f' {int(d.occurrence)}'
-    text = (
-        f'{name}{number}: velocity residual {float(d.ratio):.2f} x threshold '
-        f'({float(d.residual):.3g} / {float(d.threshold):.3g} 1/s)'
-    )
+    if d.threshold == STATISTIC:
+        text = f'{name}{number}: control-room test at {float(d.ratio):.2f} x its limit'
+    else:
+        text = (
+            f'{name}{number}: velocity residual {float(d.ratio):.2f} x threshold '
+            f'({float(d.residual):.3g} / {float(d.threshold):.3g} 1/s)'
+        )
     if transition in (RAISED, CHANGED):
         text += f' for {duration:.3g} s, {NE107[int(d.level)]}'
     elif transition == CLEARED:

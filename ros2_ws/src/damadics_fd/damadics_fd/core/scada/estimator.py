@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 from damadics_fd.core import quality
 from damadics_fd.core.approximator.state import Estimate
 from damadics_fd.core.intake import Intake
+from damadics_fd.core.judgement import Judgement
 from damadics_fd.core.modes import PHASE_HOLD, PHASE_INIT, PHASE_LEARN_PHI, PHASE_MONITOR, PHASES
 from damadics_fd.core.quality import Refused
 from damadics_fd.core.record import Array, Floats, Ints, Plain, Saved
 from damadics_fd.core.scada.kernel import Shown, take_column, write
 from damadics_fd.core.scada.monitor import ScadaMonitor
+from damadics_fd.core.scada.naming.looks import Looks
 from damadics_fd.core.scada.settings import ScadaSettings
 from damadics_fd.core.scada.state import MONITOR, Reference
 from damadics_fd.core.settings import Settings
@@ -58,9 +60,12 @@ class ScadaEstimator(Intake):
     :param settings: all settings, of mode `scada`.
     """
 
+    stride = 60
+
     def __init__(self, settings: Settings) -> None:
         self.monitor = ScadaMonitor(scada_settings(settings))
         super().__init__(settings)
+        self._looks = Looks()
         self.shown = Shown.rows()
         self._estimate = Estimate.rows()
         self.reset()
@@ -196,6 +201,15 @@ class ScadaEstimator(Intake):
         return self.monitor.progress
 
     @property
+    def judgement(self) -> Judgement | None:
+        """
+        Return what the latest fault is taken for; looked at anew as the evidence grows.
+
+        :return: the judgement, None before any alarm.
+        """
+        return self._looks.judge(self.monitor)
+
+    @property
     def status(self) -> str:
         """
         Say in one line what the monitor does.
@@ -208,7 +222,10 @@ class ScadaEstimator(Intake):
             if isolation:
                 return f'monitoring; alarm: {isolation.text()}'
             off = self.monitor.missing()
-            return f'monitoring; no test of {", ".join(off)}' if off else 'monitoring'
+            told = [f'no test of {", ".join(off)}'] if off else []
+            return '; '.join(['monitoring', *told, *self.monitor.drifts()])
+        if phase == PHASE_HOLD and self.monitor.strange:
+            return f'on hold: {self.monitor.strange}'
         if phase == PHASE_HOLD:
             return 'on hold: the models settle'
         if phase == PHASE_INIT:

@@ -14,7 +14,7 @@ from damadics_fd.core.modes import PHASE_HOLD, PHASE_MONITOR
 from damadics_fd.core.quality import Quality
 from damadics_fd.core.record import Array, Floats, Ints, Record, Rows
 from damadics_fd.core.scada.laws.actuator import F_RANGE, P_RANGE, T_RANGE, TPH_PER_KGS
-from damadics_fd.core.scada.monitor import usable
+from damadics_fd.core.scada.samples import usable
 from damadics_fd.core.scada.step import accepts, step
 from damadics_fd.core.settings import Settings
 

@@ -9,30 +9,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from damadics_fd.core.jit import jit
 from damadics_fd.core.scada.judging.cusum import R2, TEST_NAMES, TESTS
-from damadics_fd.core.scada.judging.predict import predict
-from damadics_fd.core.scada.judging.residuals import residuals
+from damadics_fd.core.scada.judging.predict import STRANGE
+from damadics_fd.core.scada.judging.residuals import FLOW_DRIFT, STEM_DRIFT
 from damadics_fd.core.scada.laws.actuator import F_RANGE, P_RANGE, T_RANGE, TPH_PER_KGS
 from damadics_fd.core.scada.learning import LearningError, learn
+from damadics_fd.core.scada.loops import TRACE, bring_up, collect, run_column
 from damadics_fd.core.scada.naming.isolation import Isolation, Isolator
+from damadics_fd.core.scada.samples import scada_samples
 from damadics_fd.core.scada.settings import ScadaSettings
-from damadics_fd.core.scada.state import MONITOR, REFERENCE, MonitorState
-from damadics_fd.core.scada.step import accepts, step
+from damadics_fd.core.scada.state import HISTORY_LENGTH, MONITOR, REFERENCE, MonitorState
 
 Floats = NDArray[np.float64]
-TRACE = np.dtype(
-    [
-        ('t', np.float64),
-        ('r1', np.float64),
-        ('r2', np.float64),
-        ('ratio', np.float64),
-        ('worst', np.int64),
-        ('alarm', np.bool_),
-    ]
-)
-FARTHEST = 5.0  # times 4 MPa: no control valve works above
-OUTSIDE = 0.25  # share of full scale a measurement may lie outside its range
 KEPT = ('alarm', 't_alarm', 't_onset', 'test', 'occurrence', 'stood', 'recovery', 'stands')
 FLOW_TEST = [test.residual for test in TESTS].index(R2) + 1
 LEARN_AGAIN_S = 60.0
@@ -59,108 +47,6 @@ class ScadaDecision:
     ratio: float
     test: str
     alarm: bool
-
-
-def scada_samples(columns: Mapping[str, np.ndarray]) -> Floats:
-    """
-    Return the columns of a recording as rows t, CV, X', P1', P2', T1', F', scaled to 0..1.
-
-    :param columns: `stamp` (ns) and cv, x1; p1, p2 (Pa), t1 (degC), flow (kg/s) where measured.
-    :return: array of shape (n, 7); NaN where not measured.
-    """
-    n = len(columns['stamp'])
-    missing = np.full(n, np.nan)
-    return np.column_stack(
-        [
-            columns['stamp'] / 1e9,
-            columns['cv'],
-            columns['x1'],
-            columns.get('p1', missing) / P_RANGE,
-            columns.get('p2', missing) / P_RANGE,
-            columns.get('t1', missing) / T_RANGE,
-            columns.get('flow', missing) * (TPH_PER_KGS / F_RANGE),
-        ]
-    ).astype(np.float64)
-
-
-@jit
-def usable(sample: np.ndarray, s: MonitorState) -> bool:
-    """Tell whether a sample may enter: in time order, finite, near its ranges."""
-    if not math.isfinite(sample[0]) or (s.samples > 0 and sample[0] <= s.t_raw):
-        return False
-    for i in range(1, 3):
-        if not -OUTSIDE <= sample[i] <= 1.0 + OUTSIDE:  # NaN: refused
-            return False
-    for i in range(3, 5):
-        if not math.isnan(sample[i]) and not -OUTSIDE <= sample[i] <= FARTHEST:
-            return False
-    return not math.isinf(sample[5]) and not math.isinf(sample[6])
-
-
-@jit
-def _run(
-    state: np.ndarray,
-    settings: np.ndarray,
-    reference: np.ndarray,
-    samples: np.ndarray,
-    trace: np.ndarray,
-) -> int:
-    s = state[0]
-    count = 0
-    for i in range(samples.shape[0]):
-        row = samples[i]
-        if not usable(row, s) or not accepts(s, settings[0], row[0]):
-            continue
-        step(s, settings[0], reference[0], row[0], row[1], row[2], row[3], row[4], row[5], row[6])
-        out = trace[count]
-        out.t = s.t
-        out.r1 = s.residual[0]
-        out.r2 = s.residual[1]
-        out.ratio = s.ratio
-        out.worst = s.worst
-        out.alarm = s.alarm
-        count += 1
-    return count
-
-
-@jit
-def _collect(
-    state: np.ndarray,
-    settings: np.ndarray,
-    samples: np.ndarray,
-    start: int,
-    buffer: np.ndarray,
-    filled: int,
-    until: float,
-) -> tuple[int, int]:
-    s = state[0]
-    i = start
-    while i < samples.shape[0] and filled < buffer.shape[0]:
-        row = samples[i]
-        i += 1
-        if not usable(row, s) or not accepts(s, settings[0], row[0]):
-            continue
-        if s.samples == 0:
-            s.t_first = row[0]
-        s.samples += 1
-        s.t = row[0]
-        buffer[filled] = row
-        filled += 1
-        if row[0] - s.t_first >= until:
-            break
-    return i, filled
-
-
-@jit
-def _replay(
-    state: np.ndarray, settings: np.ndarray, reference: np.ndarray, samples: np.ndarray
-) -> None:
-    s = state[0]
-    for i in range(samples.shape[0]):
-        r = samples[i]
-        predict(s, settings[0], reference[0], r[0], r[1], r[2], r[3], r[4], r[5], r[6])
-        residuals(s, reference[0], r[2], r[3], r[4], r[5], r[6])
-        s.t_raw = r[0]
 
 
 class ScadaMonitor:
@@ -317,7 +203,7 @@ class ScadaMonitor:
         trace = np.zeros(len(samples) - start, TRACE)
         count = 0
         if self.reference is not None:
-            count = _run(self._state, self._record, self.reference, samples[start:], trace)
+            count = run_column(self._state, self._record, self.reference, samples[start:], trace)
         return np.concatenate((learned, trace[:count])) if len(learned) else trace[:count]
 
     def isolate(self) -> Isolation | None:
@@ -334,6 +220,30 @@ class ScadaMonitor:
             isolator = Isolator(self._record[0], self.reference[0])
             self._isolated = (key, isolator.isolate(self.state))
         return self._isolated[1]
+
+    @property
+    def strange(self) -> str:
+        """Say that samples come at another period than the learned one; '' where they do not."""
+        state = self.state
+        if self.reference is None or state.strange < STRANGE:
+            return ''
+        n = int(state.samples)
+        ago = state.history[(n - 2) % HISTORY_LENGTH].t
+        period = float(self.reference['period'][0])
+        return (
+            f'samples come every {float(state.t - ago):.3g} s, but every {period:.3g} s were '
+            'learned from: learn anew'
+        )
+
+    def drifts(self) -> list[str]:
+        """Return what has drifted by more than half of what is followed."""
+        stem, flow = (float(v) for v in self.state.drift)
+        told = []
+        if abs(stem) > 0.5 * STEM_DRIFT:
+            told.append(f'the stem has drifted by {100.0 * stem:+.1f} % of the stroke')
+        if abs(flow) > 0.5 * FLOW_DRIFT:
+            told.append(f'the flow has drifted by {100.0 * math.expm1(flow):+.0f} %')
+        return told
 
     def missing(self) -> list[str]:
         """Return the tests that cannot be made, each with the reason."""
@@ -356,7 +266,7 @@ class ScadaMonitor:
             larger[: self._filled] = self._buffer[: self._filled]
             self._buffer = larger
         before = self._filled
-        start, self._filled = _collect(
+        start, self._filled = collect(
             self._state, self._record, samples, start, self._buffer, before, self._last_learned
         )
         quiet = np.zeros(self._filled - before, TRACE)
@@ -378,7 +288,7 @@ class ScadaMonitor:
         self.reference = reference
         self.learning_problem = ''
         self._state = np.zeros(1, MONITOR)
-        _replay(self._state, self._record, reference, record)
+        bring_up(self._state, self._record, reference, record)
         self.state.t_test = max(self.state.t_test, self.state.t)
         self.state.zero[:] = self.state.t
         self.state.llr_zero = self.state.t

@@ -53,9 +53,11 @@ class Reference(Record):
     stem_law: StemLaw
     flow_law: FlowLaw
     period: float  # of the samples learned from, s
+    regular: bool  # they came at it, one like the other
     signals: int  # bit i: signal i of the samples was measured
     low: Annotated[Floats, 7]  # learned range of each signal
     high: Annotated[Floats, 7]
+    spike: Annotated[Floats, 5]  # change of CV, X, P1, P2, F that, taken back at once, is none
     seconds: float  # how long the record was
     drop: float  # P1 - P2
     flow_max: float
@@ -99,16 +101,18 @@ class MonitorState(Record):
     past: Annotated[Floats, 2, TAPS]
     p_hat: Annotated[Floats, 2]
     steady: int  # samples in a row at the period
+    strange: int  # samples in a row at another period than the learned one
     innovation: Annotated[Floats, 2]  # of P1, P2; NaN until as many as taps are steady
     stem: Annotated[Rows[StemState], 2]  # nominal, wide play
     track: StemTrack
     xs: float  # slow copy of the stem law
-    last: Annotated[Floats, 5]  # CV, X, P1, P2, F of the sample before
+    last: Annotated[Floats, 3, 5]  # CV, X, P1, P2, F of this sample and the two before
     repeats: int  # samples in a row that are the one before
     size: float
     f_lagged: float
-    flat: int  # samples in a row with the same flow
-    last_flow: float
+    top_flow: float  # largest so far, and how often: a meter at its end shows it again and again
+    top_count: int
+    drift: Annotated[Floats, 2]  # of stem (share of stroke) and flow (log) since learning
     level: Annotated[Floats, 2]  # where P1, P2 have been lately
     level_before: Annotated[Floats, 2]  # the same before the present occurrence
     level_flow: float

@@ -19,6 +19,7 @@ CAPS = (3.0, 1.2, 1.05)
 QUICK = 0.5  # allowance of a test that is not slow
 ONE_SAMPLE = 0.8  # of a limit, the most that a single sample brings
 JUMP = 6.0  # sigma from one sample to the next that may be a spike
+RETURNED = 0.3  # of a jump, by which the value may still be off when it has come back
 BACK = 4.0  # sigma within which it has come back
 RECOVERY = 60  # testable samples in a row without evidence after which a fault has gone
 # A fault that shows now and then, as when the stem turns, must stay away longer every time.
@@ -41,23 +42,35 @@ def silence(s: MonitorState) -> None:
 
 
 @jit
+def taken_back(s: MonitorState, ref: Reference) -> bool:
+    """Tell whether a signal jumped with the sample before and has come back with this one."""
+    for i in range(1, 5):
+        there = abs(s.last[1, i] - s.last[2, i])
+        if there > ref.spike[i] > 0.0 and abs(s.last[0, i] - s.last[2, i]) < RETURNED * there:
+            return True
+    return False
+
+
+@jit
 def reject_spikes(s: MonitorState, ref: Reference) -> None:
     """Take back what a single sample brought that has come back at the next one."""
+    back = taken_back(s, ref)
     for r in range(N_RESIDUALS):
         value = s.residual[r]
+        jumped = s.jumped[r]
         far = False
         for i in range(N_TESTS):
             if TEST_RESIDUAL[i] != r or not ref.sd[i] > 0.0 or math.isnan(value):
                 continue
             z = abs(value - ref.mu[i]) / ref.sd[i]
-            if s.jumped[r] > 0:
-                if z < BACK:
-                    for j in range(N_TESTS):
-                        if TEST_RESIDUAL[j] == r:
-                            s.g[j, 0] = s.saved[j, 0]
-                            s.g[j, 1] = s.saved[j, 1]
-                    s.spikes[r] += 1
-            elif z > JUMP:
+            if jumped > 0 and (back or z < BACK):
+                for j in range(N_TESTS):
+                    if TEST_RESIDUAL[j] == r:
+                        s.g[j, 0] = s.saved[j, 0]
+                        s.g[j, 1] = s.saved[j, 1]
+                s.spikes[r] += 1
+                jumped = 0
+            if jumped == 0 and z > JUMP:
                 far = s.g[i, 0] < ref.h[i] and s.g[i, 1] < ref.h[i]
                 for j in range(N_TESTS):
                     if TEST_RESIDUAL[j] == r:

@@ -4,7 +4,6 @@
 
 import math
 from statistics import NormalDist
-from typing import Any
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from damadics_fd.core.scada.judging.cusum import PROCESS, R1, R2, TESTS, siegmun
 from damadics_fd.core.scada.judging.decide import LLR_CLIP
 from damadics_fd.core.scada.laws.robust import Floats, block_spread, spread_of
 from damadics_fd.core.scada.settings import ScadaSettings
-from damadics_fd.core.scada.state import LAW
+from damadics_fd.core.scada.state import LAW, Reference
 
 DAY_S = 86400.0
 LONG_RECORD = 3000  # samples below which the tails of r1 are not known well enough
@@ -97,7 +96,7 @@ def inliers(values: Floats) -> Floats:
 
 
 def set_limits(
-    ref: Any,
+    ref: Reference,
     settings: ScadaSettings,
     values: Floats,
     sigma: Floats,
@@ -114,18 +113,18 @@ def set_limits(
     :param slow: factor on sigma for sums of r2 over many samples.
     :param wandering: the inputs have no constant mean.
     """
-    arl = arl_per_test(settings, max(settings.period_s, float(ref['period'])))
+    arl = arl_per_test(settings, max(settings.period_s, float(ref.period)))
     for i, test in enumerate(TESTS):
         margin = test.wandering if wandering else test.margin
         if not margin > 0.0:
             continue
         if test.residual == PROCESS:
-            if ref['drop'] > 0.0:
-                ref['mu'][i], ref['sd'][i], ref['k'][i] = 0.0, 1.0, 0.5
-                ref['h'][i], ref['clip'][i] = 0.999, 1.0
+            if ref.drop > 0.0:
+                ref.mu[i], ref.sd[i], ref.k[i] = 0.0, 1.0, 0.5
+                ref.h[i], ref.clip[i] = 0.999, 1.0
             continue
-        law = (test.residual == R1 and ref['stem_kind'] == LAW) or (
-            test.residual == R2 and ref['flow_kind'] == LAW
+        law = (test.residual == R1 and ref.stem_kind == LAW) or (
+            test.residual == R2 and ref.flow_kind == LAW
         )
         r = inliers(values[:, test.residual])
         if r.size < LEAST // 2:
@@ -149,12 +148,12 @@ def set_limits(
         if (wandering or n < LONG_RECORD) and test.residual == R1 and test.k0 == 4.0:
             clip = JUMP_CLIP
         largest = cusum_maximum((r - mu) / sd, k, clip)
-        ref['mu'][i], ref['sd'][i], ref['k'][i], ref['clip'][i] = mu, sd, k, clip
-        ref['se'][i] = (STANDARD_ERRORS[test.block] or DISTANCE_ERRORS) / math.sqrt(n)
-        ref['h'][i] = max(margin * siegmund_limit(k, arl), HEAD_ROOM * largest)
+        ref.mu[i], ref.sd[i], ref.k[i], ref.clip[i] = mu, sd, k, clip
+        ref.se[i] = (STANDARD_ERRORS[test.block] or DISTANCE_ERRORS) / math.sqrt(n)
+        ref.h[i] = max(margin * siegmund_limit(k, arl), HEAD_ROOM * largest)
 
 
-def _of_law(ref: Any, i: int, r: Floats, sigma: float, arl: float) -> None:
+def _of_law(ref: Reference, i: int, r: Floats, sigma: float, arl: float) -> None:
     """Set one test of an identified law: the dead zone is in the residual, its mean is 0."""
     test = TESTS[i]
     if test.k0 < SLOWEST_OF_LAW:
@@ -162,12 +161,12 @@ def _of_law(ref: Any, i: int, r: Floats, sigma: float, arl: float) -> None:
     one = sigma if sigma > 0.0 else max(spread_of(r), 1.0)
     sd = max(one, block_spread(r, test.block))
     largest = cusum_maximum(r / sd, test.k0, test.clip)
-    ref['mu'][i], ref['sd'][i], ref['k'][i], ref['clip'][i] = 0.0, sd, test.k0, test.clip
-    ref['h'][i] = max(LAW_MARGIN * siegmund_limit(test.k0, arl), HEAD_ROOM * largest)
+    ref.mu[i], ref.sd[i], ref.k[i], ref.clip[i] = 0.0, sd, test.k0, test.clip
+    ref.h[i] = max(LAW_MARGIN * siegmund_limit(test.k0, arl), HEAD_ROOM * largest)
 
 
 def friction_limit(
-    ref: Any, settings: ScadaSettings, r1: Floats, wider: Floats, wandering: bool
+    ref: Reference, settings: ScadaSettings, r1: Floats, wider: Floats, wandering: bool
 ) -> None:
     """
     Set the limit of the likelihood-ratio test for friction.
@@ -184,8 +183,6 @@ def friction_limit(
     kap2 = max(1.0, (block_sigma(inliers(r), 5) / s1) ** 2)
     wide = (r + wide_by) / s1
     gain = ((r / s1) ** 2 - wide**2) / (2.0 * kap2)
-    ref['s1'], ref['kap2'] = s1, kap2
-    arl = arl_per_test(settings, max(settings.period_s, float(ref['period'])))
-    ref['llr_limit'] = max(
-        LLR_MARGINS[wandering] * math.log(arl), LLR_HEAD_ROOM * _llr_maximum(gain)
-    )
+    ref.s1, ref.kap2 = s1, kap2
+    arl = arl_per_test(settings, max(settings.period_s, float(ref.period)))
+    ref.llr_limit = max(LLR_MARGINS[wandering] * math.log(arl), LLR_HEAD_ROOM * _llr_maximum(gain))

@@ -23,6 +23,9 @@ from damadics_fd.core.scada.state import HISTORY_LENGTH, LAW, MonitorState, Refe
 
 FORGET_S = 300.0
 SETTLING_PERIODS = 10.0
+OTHER_PERIOD = 1.6  # factor between two sample periods that are not the same
+STRANGE = 20  # samples in a row
+METER_LAGS = 3.0  # after a gap, until a flow meter shows the flow
 COPIES = 2  # rows in a row that may be copies
 GAP_PERIODS = 5.0  # sample periods without a sample that are no gap yet
 
@@ -44,7 +47,6 @@ def restart(
         s.track.lagged[:] = (x - ref.stem_law.offset) / ref.stem_law.gain
         s.track.held[:] = s.track.lagged[0]
     s.f_lagged = math.nan
-    s.flat = 0
     start_stem(s.stem[0], cfg.act, t)
     copy_stem(s.stem[0], s.stem[1])
     s.fault[1].f4 = cfg.wide_play - cfg.act.stem_play
@@ -64,15 +66,29 @@ def restart(
 
 
 @jit
+def watch_period(s: MonitorState, cfg: ScadaConfig, ref: Reference, t: float) -> None:
+    """Make no test while samples come at another period than the one that was learned."""
+    if s.samples == 0 or not ref.regular:
+        return
+    share = (t - s.t) / max(cfg.period_s, ref.period)
+    s.strange = s.strange + 1 if share > OTHER_PERIOD or share * OTHER_PERIOD < 1.0 else 0
+    if s.strange >= STRANGE:
+        s.t_test = max(s.t_test, t + ref.period)
+
+
+@jit
 def count_repeats(s: MonitorState, cv: float, x: float, p1: float, p2: float, flow: float) -> None:
     """Count samples in a row whose values are all those of the sample before."""
     now = (cv, x, p1, p2, flow)
     same = True
     for i in range(5):
         value = now[i]
-        if value != s.last[i] and not (math.isnan(value) and math.isnan(s.last[i])):
+        before = s.last[0, i]
+        if value != before and not (math.isnan(value) and math.isnan(before)):
             same = False
-        s.last[i] = value
+        s.last[2, i] = s.last[1, i]
+        s.last[1, i] = before
+        s.last[0, i] = value
     s.repeats = s.repeats + 1 if same else 0
 
 
@@ -155,11 +171,14 @@ def predict(
             silence(s)
         else:
             s.t_test = max(s.t_test, t + settling(cfg, ref))
+        if ref.flow_kind == LAW:
+            s.t_test = max(s.t_test, t + METER_LAGS * ref.flow_law.lag_s)
         if t - s.t > FORGET_S:  # what stood then is not known now: new evidence decides
             s.stands[:] = 0
             s.stood = False
             s.t_gone = t
         restart(s, cfg, ref, t, cv, x, p1, p2)
+    watch_period(s, cfg, ref, t)
     entry = s.history[s.samples % HISTORY_LENGTH]
     t0 = s.t if s.filled > 0 else t
     s.samples += 1
@@ -286,8 +305,11 @@ def predict_by_law(
     s.f = math.nan
     s.sq = 1.0
     s.masked = True
-    s.flat = s.flat + 1 if flow == s.last_flow else 0
-    s.last_flow = flow
+    if flow > s.top_flow:
+        s.top_flow = flow
+        s.top_count = 1
+    elif flow == s.top_flow:
+        s.top_count += 1
     s.size = sizing(law.medium, p1, p2, t1)
     if math.isnan(x) or math.isnan(s.size) or math.isnan(flow) or math.isinf(s.size):
         return

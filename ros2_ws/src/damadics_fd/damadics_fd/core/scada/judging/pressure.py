@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Learned linear predictors of a pressure: one to filter it by, one to test it against."""
 
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +31,7 @@ PRESSURE = PressureFilter.dtype()
 
 
 @jit
-def predict_pressure(filt: PressureFilter, past: np.ndarray) -> Any:
+def predict_pressure(filt: PressureFilter, past: np.ndarray) -> float:
     """Return sum a_i P'(k-i); `past` holds the newest raw sample first."""
     total = 0.0
     for i in range(TAPS):
@@ -40,7 +40,7 @@ def predict_pressure(filt: PressureFilter, past: np.ndarray) -> Any:
 
 
 @jit
-def innovation(filt: PressureFilter, past: np.ndarray, measured: float) -> Any:
+def innovation(filt: PressureFilter, past: np.ndarray, measured: float) -> float:
     """
     Return P'(k) less its prediction about the learned mean.
 
@@ -53,7 +53,7 @@ def innovation(filt: PressureFilter, past: np.ndarray, measured: float) -> Any:
 
 
 @jit
-def fuse_pressure(filt: PressureFilter, past: np.ndarray, measured: float) -> Any:
+def fuse_pressure(filt: PressureFilter, past: np.ndarray, measured: float) -> float:
     """Return P^(k) = c P'(k) + (1-c) pr(k), or P'(k) itself where it jumped."""
     predicted = predict_pressure(filt, past)
     if abs(measured - predicted) > GATE * filt.sigma:
@@ -69,13 +69,13 @@ def push(past: np.ndarray, value: float) -> None:
     past[0] = value
 
 
-def learn_pressure(pressure: NDArray[np.float64], sigma: float, filt: np.ndarray) -> None:
+def learn_pressure(pressure: NDArray[np.float64], sigma: float, filt: PressureFilter) -> None:
     """
     Fit both predictors by ridge least squares, the fusion weight from the first one's error.
 
     :param pressure: fault-free pressure, share of full scale, shape (n,).
     :param sigma: standard deviation of the sensor noise, share of full scale.
-    :param filt: structured array of `PRESSURE`, written in place.
+    :param filt: record of `PressureFilter`, written in place.
     """
     n = pressure.size
     taps = TAPS if n >= SHORT_RECORD else SHORT_TAPS
@@ -90,13 +90,13 @@ def learn_pressure(pressure: NDArray[np.float64], sigma: float, filt: np.ndarray
     a = np.zeros(TAPS)
     a[1:taps] = weights
     a[0] = 1.0 - weights.sum()
-    filt['a'] = a
-    filt['c'] = variance / (variance + sigma**2)
-    filt['sigma'] = error.std()
+    filt.a[:] = a
+    filt.c = variance / (variance + sigma**2)
+    filt.sigma = error.std()
     mean = pressure.mean()
     design = np.column_stack([lagged - mean, np.ones(target.size)])
     ridge = 0.05 * target.size * sigma**2 * np.diag([*np.ones(taps), 0.0])
     weights = np.linalg.solve(design.T @ design + ridge, design.T @ (pressure[taps:] - mean))
-    filt['mean'] = mean
-    filt['b'][0, :taps] = weights[:taps]
-    filt['b0'] = weights[taps]
+    filt.mean = mean
+    filt.b[:taps] = weights[:taps]
+    filt.b0 = weights[taps]

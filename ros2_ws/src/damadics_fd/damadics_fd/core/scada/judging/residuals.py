@@ -7,7 +7,7 @@ import math
 from damadics_fd.core.jit import jit
 from damadics_fd.core.scada.judging.cusum import P1, P2, PROCESS, R1, R2, T1
 from damadics_fd.core.scada.judging.predict import repeated
-from damadics_fd.core.scada.laws.flow_law import flow_doubt
+from damadics_fd.core.scada.laws.flow_law import flow_doubt, slope
 from damadics_fd.core.scada.laws.stem_law import outside, stem_doubt, transient_doubt
 from damadics_fd.core.scada.state import HISTORY_LENGTH, LAW, N_WEIGHTS, MonitorState, Reference
 
@@ -21,9 +21,13 @@ STOP_S = 60.0
 HOURS_S = 10800.0
 STEM_HOURS = 0.002  # standard deviation, share of stroke
 FLOW_HOURS = 0.05  # share of the flow
+DRIFT_S = 2.0 * 3600.0  # so slowly a drift is followed
+STEM_DRIFT = 0.01  # of the stroke
+FLOW_DRIFT = 0.1  # of log F
+CALM = 0.5  # of a limit: nothing speaks of a fault
 END = 0.985  # of the meter's range: it shows no more
 LEAST = 0.03  # of the meter's range: it shows no less
-FLAT = 3  # equal flows in a row, above all learned: the end of an unknown range
+AGAIN = 2  # times that the largest flow of all was shown: the end of its range
 FOLLOW_S = 600.0  # a process pressure is followed this slowly
 FOLLOW_FAR_S = 3600.0  # and this slowly while it is far off
 MOVED = 0.03  # a flow that moved by this share explains a pressure
@@ -58,7 +62,8 @@ def residuals(
     correction = 0.0
     xm = s.xm[0]
     if ref.stem_kind == LAW:
-        raw = outside(x, xm, s.xs)
+        raw = outside(x - s.drift[0], xm, s.xs)
+        follow_drift(s, 0, x - xm, STEM_DRIFT, 2.0 * ref.s1)
         doubt = DOUBT * stem_doubt(ref.stem_law, xm) + DOUBT * STEM_HOURS * hours_unseen(ref)
         doubt += transient_doubt(s.track, ref.stem_law)
         s.lever[0] = 1.0
@@ -89,6 +94,23 @@ def residuals(
 
 
 @jit
+def follow_drift(s: MonitorState, which: int, error: float, limit: float, step: float) -> None:
+    """
+    Follow what a plant changes over hours, within a limit and while nothing speaks of a fault.
+
+    :param which: 0 the stem, 1 the flow.
+    :param error: measured less model, the drift not taken off.
+    :param limit: largest drift that is followed; step: largest error that counts.
+    """
+    if s.stood or s.ratio > CALM or s.filled < 1:
+        return
+    dt = s.t - s.history[(s.samples - 1) % HISTORY_LENGTH].t0
+    away = min(max(error - s.drift[which], -step), step)
+    moved = s.drift[which] + (1.0 - math.exp(-dt / DRIFT_S)) * away
+    s.drift[which] = min(max(moved, -limit), limit)
+
+
+@jit
 def lever(at: float, mean: float, sd: float) -> float:
     """Return the standard error at a place over that in the middle of what was learned."""
     away = (at - mean) / sd
@@ -110,21 +132,26 @@ def flow_residual(s: MonitorState, ref: Reference, x: float, flow: float) -> flo
     if s.masked:
         return math.nan if math.isnan(flow) else 0.0
     hours = FLOW_HOURS * hours_unseen(ref)
+    middle = s.f * math.exp(s.drift[1])
     doubt = flow_doubt(law, x, s.size)
-    band = math.exp(DOUBT * math.sqrt(doubt * doubt + hours * hours))
+    drifted = abs(slope(law, x) * s.drift[0])  # of the stem, or of its sensor alone
+    band = math.exp(DOUBT * math.sqrt(doubt * doubt + hours * hours) + drifted)
     scale = law.range if law.range > 0.0 else ref.flow_max
     floor = 0.005 * scale
-    low = s.f / band - floor
-    high = s.f * band + floor
-    ended = law.range > 0.0 and flow >= END * law.range
-    if law.range <= 0.0 and s.flat >= FLAT and flow > ref.flow_max:
-        ended = True
+    low = middle / band - floor
+    high = middle * band + floor
+    top = law.range
+    if s.top_count >= AGAIN and s.top_flow >= END * ref.flow_max:
+        top = min(top, s.top_flow) if top > 0.0 else s.top_flow
+    ended = top > 0.0 and flow >= END * top
     if ended:
         low = -math.inf  # the flow may be anything above what is shown
     elif flow < LEAST * scale:
         low = min(low, LEAST * scale)  # and here anything below
         if low < LEAST * scale * 1.5:
             low = -math.inf
+    elif s.f > LEAST * scale:
+        follow_drift(s, 1, math.log(flow / s.f), FLOW_DRIFT, 2.0 * law.spread)
     value = 0.0
     if flow > high:
         value = flow - high

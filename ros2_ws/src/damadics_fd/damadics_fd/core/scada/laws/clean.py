@@ -9,7 +9,18 @@ import numpy as np
 from damadics_fd.core.scada.laws.robust import Floats, spread_of
 
 ISOLATED = 8.0  # sigma of the change from sample to sample
+ALIKE, MOST = 0.2, 0.9  # share of the period, share of the samples
 MEASURED = (2, 3, 4, 5, 6)  # columns that a transmitter sends; CV is what was commanded
+
+
+def spike_sizes(samples: Floats) -> Floats:
+    """Return for CV, X', P1', P2', F' from which size on a change that comes back is a spike."""
+    sizes = np.zeros(5)
+    for i, column in enumerate((1, 2, 3, 4, 6)):
+        v = samples[:, column]
+        off = v[1:-1] - 0.5 * (v[:-2] + v[2:])
+        sizes[i] = ISOLATED * spread_of(off) if np.isfinite(off).sum() > 5 else 0.0
+    return sizes
 
 
 def despiked(samples: Floats) -> Floats:
@@ -39,6 +50,12 @@ def despiked(samples: Floats) -> Floats:
 def period_of(t: Floats) -> float:
     """Return the usual time between samples, s."""
     return float(np.median(np.diff(t))) if len(t) > 1 else 1.0
+
+
+def is_regular(t: Floats) -> bool:
+    """Tell whether samples come at one period; a historian may leave some out."""
+    between = np.diff(t)
+    return bool(len(t) > 1 and np.mean(np.abs(between / np.median(between) - 1.0) < ALIKE) > MOST)
 
 
 def split(samples: Floats, gap: float) -> Iterator[Floats]:

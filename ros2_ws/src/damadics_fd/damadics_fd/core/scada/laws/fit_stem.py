@@ -22,6 +22,8 @@ OFFSET_SPREAD = 0.05
 SLOWEST = 1.0 / 120.0  # stroke/s: a positioner that passes no more air than this is rare
 TRANSIENT_ROOM = 1.2
 LARGE = 10.0  # sigma
+SLOW_RATE = 0.02  # stroke/s: so slow a stem is not equally slow at all places
+SLOW_TRANSIENT = 0.2  # and this share of the way still to go is not known
 LIMITED = 0.7  # of a rate limit that was found: seen to hold
 BETTER = 0.98  # a further parameter must cut the error to this share
 LAGS = (0.0, 0.3, 0.6, 1.0, 1.5, 2.0, 3.0, 5.0, 8.0, 12.0, 20.0, 35.0)
@@ -151,13 +153,16 @@ def _proven(law: np.ndarray, pieces: Sequence[Piece]) -> None:
         law[f'slow_{name}'] = max(min(slow, limit), min(SLOWEST, limit))
 
 
-def _transient(left: Floats, ahead: Floats, sigma: float) -> float:
+def _transient(law: np.ndarray, left: Floats, ahead: Floats, sigma: float) -> float:
     """Return by which share of the way still to go the law errs in large moves."""
     large = ahead > LARGE * sigma
     if large.sum() < 10:
         return TRANSIENT
     share = (np.abs(left[large]) - 3.0 * sigma) / ahead[large]
-    return max(TRANSIENT, TRANSIENT_ROOM * float(np.quantile(share, 0.995)))
+    slow = min(float(law['rise'][0]), float(law['fall'][0])) < SLOW_RATE
+    return max(
+        SLOW_TRANSIENT if slow else TRANSIENT, TRANSIENT_ROOM * float(np.quantile(share, 0.995))
+    )
 
 
 def _finish(law: np.ndarray, pieces: Sequence[Piece], x: Floats) -> StemFit:
@@ -189,5 +194,5 @@ def _finish(law: np.ndarray, pieces: Sequence[Piece], x: Floats) -> StemFit:
     law['v_offset'], law['v_gain'] = covariance[0, 0], covariance[1, 1]
     position = np.clip(law['offset'] + law['gain'] * track[:, :2], 0.0, 1.0)
     left = x - position[:, 0]
-    law['transient'] = _transient(left, track[:, 2], sigma)
+    law['transient'] = _transient(law, left, track[:, 2], sigma)
     return StemFit(law, position, left, spread_of(left), 1.0 + float(free[1]), error)

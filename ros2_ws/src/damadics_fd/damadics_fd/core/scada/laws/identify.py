@@ -17,7 +17,9 @@ from damadics_fd.core.scada.laws.flow_law import GAS
 from damadics_fd.core.scada.laws.robust import Floats
 from damadics_fd.core.scada.laws.stem_law import FAST
 from damadics_fd.core.scada.learning import LearningError, learn
-from damadics_fd.core.scada.monitor import scada_samples
+from damadics_fd.core.scada.monitor import ScadaMonitor
+from damadics_fd.core.scada.samples import scada_samples
+from damadics_fd.core.scada.settings import ScadaSettings
 from damadics_fd.core.scada.state import LAW, Reference
 from damadics_fd.core.settings import Settings
 
@@ -60,10 +62,28 @@ def identify(
         *_stem(reference),
         *_flow(reference, settings, notes),
     ]
-    missed = _missed(reference, period)
+    missed = _missed(reference, period) + _second_half(samples, own)
     verdict = LIMITED if missed else OK
     report += [*(f'limited: {text}' for text in missed), f'verdict: {verdict}']
     return Identified(verdict, changes, tuple(report), tuple(missed), Reference.plain(reference))
+
+
+def _second_half(samples: Floats, settings: ScadaSettings) -> list[str]:
+    """Learn from the first half and watch the second: say what that raises."""
+    half = len(samples) // 2
+    try:
+        reference = learn(samples[:half], settings, math.inf)
+    except LearningError as problem:
+        return [f'the first half alone is not enough to check what was learned: {problem}']
+    monitor = ScadaMonitor(settings, reference)
+    monitor.run_samples(samples[half:])
+    alarms = int(monitor.state.occurrence)
+    if not alarms:
+        return []
+    return [
+        f'learned from the first half, the second raises {alarms} alarms: a fault in it, or loads '
+        'that the first does not show'
+    ]
 
 
 def pooled(recordings: Sequence[FaultFree]) -> Floats:

@@ -2,17 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Refuse to learn what cannot be a valve that works."""
 
-from typing import Any
-
 import numpy as np
 
 from damadics_fd.core.scada.laws.fit_stem import StemFit
 from damadics_fd.core.scada.laws.robust import Floats
 from damadics_fd.core.scada.settings import ScadaSettings
-from damadics_fd.core.scada.state import LAW
+from damadics_fd.core.scada.state import LAW, Reference
 
 UNKNOWN_GAIN = 0.2  # standard error of the stem's gain above which the record shows no motion
 GAIN = 0.1  # a positioner's gain may differ from 1 by this
+UNRELATED = 0.3  # fitted gain below which the stem does not follow CV
 OFFSET = 0.1
 SIGMAS = 4.0
 UNLIKE = 'this does not look like a valve that works'
@@ -38,7 +37,7 @@ def check_stem(fit: StemFit, cv: Floats, x: Floats) -> None:
             'follows it: learn while the valve works'
         )
     slack = max(GAIN, SIGMAS * fit.gain_error)
-    if abs(fit.gain - 1.0) > slack:
+    if abs(fit.gain - 1.0) > slack and not (_reach_alike(cv, x, slack) and fit.gain > UNRELATED):
         raise LearningError(
             f'{UNLIKE}: the stem moves by {fit.gain:.2f} of what CV asks (1 expected): stuck, '
             'bent feedback or a wrong scale; mend it or check the units'
@@ -51,7 +50,17 @@ def check_stem(fit: StemFit, cv: Floats, x: Floats) -> None:
         )
 
 
-def check_flow(ref: Any, settings: ScadaSettings) -> None:
+def _reach_alike(cv: Floats, x: Floats, slack: float) -> bool:
+    """
+    Tell whether the stem moves as far as CV does.
+
+    A command that changes between the samples takes away from a fitted gain, not from the reach.
+    """
+    asked, done = (float(np.quantile(v, 0.9) - np.quantile(v, 0.1)) for v in (cv, x))
+    return abs(done - asked) <= slack * asked
+
+
+def check_flow(ref: Reference, settings: ScadaSettings) -> None:
     """
     Refuse a flow that the stated valve coefficient cannot give.
 
@@ -59,9 +68,9 @@ def check_flow(ref: Any, settings: ScadaSettings) -> None:
     :param settings: whether the coefficient was stated.
     :raises LearningError: saying what was found.
     """
-    if settings.kv_stated and ref['flow_kind'] == LAW and abs(float(ref['g1']) - 1.0) > FLOW_GAIN:
+    if settings.kv_stated and ref.flow_kind == LAW and abs(float(ref.g1) - 1.0) > FLOW_GAIN:
         raise LearningError(
-            f'{UNLIKE}: the flow is {float(ref["g1"]):.2f} of '
+            f'{UNLIKE}: the flow is {float(ref.g1):.2f} of '
             f'that of the stated Kv {settings.actuator.kv:g}; mend valve or meter, or state what '
             'the valve is'
         )

@@ -10,7 +10,7 @@ found there is no evidence against the valve.
 """
 
 import math
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 
@@ -72,19 +72,22 @@ def start_track(s: StemTrack, t: float, cv: float) -> None:
 
 
 @jit
-def delayed(s: StemTrack, time: float) -> Any:
+def delayed(s: StemTrack, time: float) -> float:
     """Return CV at a time, by straight lines between the samples that are kept."""
     newest = s.count % DELAYS
+    value: float = s.cv[(newest + 1) % DELAYS]
     for back in range(DELAYS - 1):
         i = (newest - back) % DELAYS
         before = (i - 1) % DELAYS
         if back >= s.count or s.t[before] <= time:
             span = s.t[i] - s.t[before]
             if back >= s.count or span <= 0.0:
-                return s.cv[i]
+                value = s.cv[i]
+                break
             share = min(max((time - s.t[before]) / span, 0.0), 1.0)
-            return s.cv[before] + share * (s.cv[i] - s.cv[before])
-    return s.cv[(newest + 1) % DELAYS]
+            value = s.cv[before] + share * (s.cv[i] - s.cv[before])
+            break
+    return value
 
 
 @jit

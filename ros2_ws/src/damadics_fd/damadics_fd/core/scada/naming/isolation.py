@@ -9,7 +9,6 @@ bounded below by what the fault-free record shows; the smallest cost ranks first
 """
 
 import math
-from typing import Any
 
 import numpy as np
 
@@ -21,6 +20,8 @@ from damadics_fd.core.scada.model import (
     FAULTS,
     STEM,
     STEM_FAULTS,
+    Faults,
+    StemState,
     advance_stem,
     copy_stem,
 )
@@ -33,7 +34,14 @@ from damadics_fd.core.scada.naming.names import (
     group_of,
 )
 from damadics_fd.core.scada.naming.witness import by_witnesses
-from damadics_fd.core.scada.state import HISTORY_LENGTH, LAW
+from damadics_fd.core.scada.settings import ScadaConfig
+from damadics_fd.core.scada.state import (
+    HISTORY_LENGTH,
+    LAW,
+    MonitorState,
+    Reference,
+)
+from damadics_fd.core.valve.parameters import Valve
 
 __all__ = ['GROUPS', 'NAMES', 'Hypothesis', 'Isolation', 'Isolator', 'group_of']
 
@@ -54,7 +62,9 @@ REFINED = 6  # hypotheses whose strength is refined
 
 
 @jit
-def _stem_error(window: np.ndarray, act: Any, fault: Any, stem: Any, late: bool) -> Any:
+def _stem_error(
+    window: np.ndarray, act: Valve, fault: Faults, stem: StemState, late: bool
+) -> float:
     """Return the mean squared error of X' under a fault that is present in the whole window."""
     copy_stem(window[0].stem, stem)
     if late:  # the fault has been there for long: start from the position it has led to
@@ -79,11 +89,12 @@ def _stem_error(window: np.ndarray, act: Any, fault: Any, stem: Any, late: bool)
             COARSE_SUB_STEPS,
         )
         total += (e.x - x - e.correction) ** 2
-    return total / window.shape[0]
+    mean: float = total / window.shape[0]
+    return mean
 
 
 @jit
-def _flow_error(window: np.ndarray, act: Any, fault: Any, g0: float, g1: float) -> float:
+def _flow_error(window: np.ndarray, act: Valve, fault: Faults, g0: float, g1: float) -> float:
     """Return the mean squared error of F' in units of its sigma; NaN where F' is not measured."""
     offset = 0.2 * fault.f2 - 0.1 * fault.f3
     scale = (1.0 - 0.2 * fault.f2) * (1.0 + 0.1 * fault.f3)
@@ -112,9 +123,9 @@ def _flow_error(window: np.ndarray, act: Any, fault: Any, g0: float, g1: float) 
     return total / n if n else math.nan
 
 
-def last_evidence(state: Any) -> float:
+def last_evidence(state: MonitorState) -> float:
     """Return until when the record tells of the present fault, s."""
-    return float(state['t_evidence']) + LINGERS_S
+    return float(state.t_evidence) + LINGERS_S
 
 
 def misfit(error: float, variance: float) -> float:
@@ -139,20 +150,20 @@ class Isolator:
     :param reference: record of `REFERENCE`.
     """
 
-    def __init__(self, settings: Any, reference: Any) -> None:
-        self._act = settings['act']
+    def __init__(self, settings: ScadaConfig, reference: Reference) -> None:
+        self._act = settings.act
         self._ref = reference
         self._stem = np.zeros(1, STEM)
         tests = [test.residual for test in TESTS]
-        self._mean_t1 = float(reference['mu'][tests.index(T1)])
+        self._mean_t1 = float(reference.mu[tests.index(T1)])
         self._nominal = (math.nan, math.nan)
         self._late = False
         self._variance = (
-            float(reference['s1']) ** 2,
-            float(reference['sd'][tests.index(R2)]) ** 2 or 1.0,
+            float(reference.s1) ** 2,
+            float(reference.sd[tests.index(R2)]) ** 2 or 1.0,
         )
 
-    def isolate(self, state: Any, abrupt: bool | None = None) -> Isolation | None:
+    def isolate(self, state: MonitorState, abrupt: bool | None = None) -> Isolation | None:
         """
         Rank the faults after an alarm.
 
@@ -160,16 +171,16 @@ class Isolator:
         :param abrupt: whether the fault came at once; by default from the test that fired.
         :return: the ranking; None where there is no alarm or too short a record yet.
         """
-        if not state['alarm']:
+        if not state.alarm:
             return None
         window = self._window(state)
         if len(window) < SHORTEST:
             return None
         ref = self._ref
-        if ref['stem_kind'] == LAW or ref['flow_kind'] == LAW:
+        if ref.stem_kind == LAW or ref.flow_kind == LAW:
             return by_witnesses(state, ref, window)
         if abrupt is None:
-            test = int(state['test'])
+            test = int(state.test)
             abrupt = test < len(TESTS) and TESTS[test].k0 >= 1.5
         shown = self._inputs(state, window)
         part = window[:FIRST]
@@ -192,27 +203,27 @@ class Isolator:
         if shown:
             best = ranking[0].cost
             shown = [Hypothesis(h.fault, h.strength, best - 10.0 * EQUAL) for h in shown]
-        return Isolation(float(state['t']), len(window), (*shown, *ranking))
+        return Isolation(float(state.t), len(window), (*shown, *ranking))
 
-    def _window(self, state: Any) -> np.ndarray:
-        count = int(state['samples'])
+    def _window(self, state: MonitorState) -> np.ndarray:
+        count = int(state.samples)
         kept = min(count, HISTORY_LENGTH)
         order = np.arange(count - kept, count) % HISTORY_LENGTH
-        window = state['history'][order]
-        window = window[(window['t'] > state['t_onset']) & (window['t'] <= last_evidence(state))]
+        window = np.asarray(state.history)[order]
+        window = window[(window['t'] > state.t_onset) & (window['t'] <= last_evidence(state))]
         self._late = len(window) > WINDOW
         return np.ascontiguousarray(window[-WINDOW:])
 
-    def _inputs(self, state: Any, window: np.ndarray) -> list[Hypothesis]:
+    def _inputs(self, state: MonitorState, window: np.ndarray) -> list[Hypothesis]:
         """Return f7 or f17 where the inputs themselves show them."""
         fired = {
             test.residual
             for i, test in enumerate(TESTS)
-            if test.residual >= P1 and state['ratios'][i] >= 1.0
+            if test.residual >= P1 and state.ratios[i] >= 1.0
         }
-        p1, p2 = self._ref['pressure']['mean']
-        first = state['t_shown'][PROCESS]  # NaN: it did not show
-        if first <= np.nanmin([*state['t_shown'], math.inf]) + PROCESS_FIRST_S:
+        p1, p2 = (float(self._ref.pressure[i].mean) for i in range(2))
+        first = state.t_shown[PROCESS]  # NaN: it did not show
+        if first <= np.nanmin([*state.t_shown, math.inf]) + PROCESS_FIRST_S:
             return [Hypothesis(17, math.nan, 0.0)]
         if T1 in fired:
             shift = T_RANGE * float(np.nanmean(window['t1']) - self._mean_t1)
@@ -236,7 +247,7 @@ class Isolator:
             of_stem = self._nominal[0]
         if flow is not None or stem is None:
             faults = nominal if flow is None else flow
-            g0, g1 = self._ref['g0'], self._ref['g1']
+            g0, g1 = self._ref.g0, self._ref.g1
             of_flow = _flow_error(window, self._act, faults[0], g0, g1)
         else:
             of_flow = self._nominal[1]

@@ -15,13 +15,14 @@ Which residuals show it, which way, in which order, and what the process does me
 """
 
 import math
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 
 from damadics_fd.core.scada.judging.cusum import PROCESS, R1, R2
 from damadics_fd.core.scada.laws.robust import spread_of
 from damadics_fd.core.scada.naming.names import Hypothesis, Isolation
+from damadics_fd.core.scada.state import MonitorState, Reference
 
 FIRST_S = 6.0  # what comes within this time of the first sign comes first
 CLEAR = 8.0  # nats for a witness that hardly errs
@@ -35,7 +36,7 @@ STEM_FAULTS = (1, 4, 9, 10, 11, 12, 13, 15, 16)
 FLOW_FAULTS = (2, 3, 5, 6, 13, 18, 19)
 
 
-def by_witnesses(state: Any, ref: Any, window: np.ndarray) -> Isolation:
+def by_witnesses(state: MonitorState, ref: Reference, window: np.ndarray) -> Isolation:
     """
     Rank the faults by what witnesses say, nats for and against.
 
@@ -45,7 +46,7 @@ def by_witnesses(state: Any, ref: Any, window: np.ndarray) -> Isolation:
     :return: the ranking.
     """
     score = dict.fromkeys((*STEM_FAULTS, *FLOW_FAULTS, 17), 0.0)
-    shown = np.array(state['t_shown'], float)
+    shown = np.array(state.t_shown, float)
     first = np.nanmin(shown) if np.isfinite(shown).any() else math.nan
 
     def early(residual: int) -> bool:
@@ -57,11 +58,11 @@ def by_witnesses(state: Any, ref: Any, window: np.ndarray) -> Isolation:
         _flow(score, state, ref, window)
     elif early(R1):
         _stem(score, state, ref, window)
-        if flow and early(R2) and state['sign'][R1] == state['sign'][R2]:
+        if flow and early(R2) and state.sign[R1] == state.sign[R2]:
             score[13] += (
                 CLEAR  # X' reads too far closed and the flow is too high for it, or both not
             )
-        elif not math.isnan(float(ref['f_mean'])) and ref['flow_max'] > 0.0:
+        elif not math.isnan(float(ref.f_mean)) and ref.flow_max > 0.0:
             score[13] -= FAIR  # the flow would not follow a position that only the sensor shows
     ranking = sorted(
         (Hypothesis(fault, math.nan, -value) for fault, value in score.items()),
@@ -70,27 +71,31 @@ def by_witnesses(state: Any, ref: Any, window: np.ndarray) -> Isolation:
     return Isolation(float(window['t'][-1]), len(window), tuple(ranking))
 
 
-def _process(score: dict[int, float], state: Any, shown: np.ndarray, early: Any) -> None:
+def _process(
+    score: dict[int, float], state: MonitorState, shown: np.ndarray, early: Callable[[int], bool]
+) -> None:
     """Judge pressures that move by themselves."""
     if not math.isnan(float(shown[PROCESS])) and early(PROCESS):
-        against = state['sign'][R2] > 0.0 and early(R2)
+        against = state.sign[R2] > 0.0 and early(R2)
         score[17] += FAIR if against else CLEAR + GOOD
     else:
         score[17] -= FAIR
 
 
-def _flow(score: dict[int, float], state: Any, ref: Any, window: np.ndarray) -> None:
+def _flow(
+    score: dict[int, float], state: MonitorState, ref: Reference, window: np.ndarray
+) -> None:
     """Judge a flow that does not fit position and pressures while the stem obeys."""
     for fault in FLOW_FAULTS:
         score[fault] += GOOD
-    up = state['sign'][R2] > 0.0
+    up = state.sign[R2] > 0.0
     for fault in (3, 6, 18) if up else (2, 5):
         score[fault] += FAIR
     score[19] += FAIR
     for fault in (2, 5) if up else (3, 6, 18):
         score[fault] -= CLEAR
     score[13] += FAIR * 0.5  # a positioner follows its sensor at once: the stem shows little
-    abrupt = float(state['t_raised'] - state['t_onset']) < 60.0
+    abrupt = float(state.t_raised - state.t_onset) < 60.0
     if abrupt:
         for fault in (2, 3, 5, 6):
             score[fault] -= GOOD  # wear grows slowly
@@ -108,9 +113,9 @@ def _few(window: np.ndarray) -> int:
     return max(int(np.searchsorted(window['t'], window['t'][0] + 15.0)), 3)
 
 
-def drop_change(ref: Any, state: Any, window: np.ndarray) -> float:
+def drop_change(ref: Reference, state: MonitorState, window: np.ndarray) -> float:
     """Return the change of log(P1 - P2) in the first moments against the level before."""
-    before = float(state['level_before'][0] - state['level_before'][1])
+    before = float(state.level_before[0] - state.level_before[1])
     part = window[: _few(window)]
     drop = part['p1'] - part['p2']
     drop = drop[np.isfinite(drop)]
@@ -120,7 +125,9 @@ def drop_change(ref: Any, state: Any, window: np.ndarray) -> float:
     return math.log(least / before)
 
 
-def _stem(score: dict[int, float], state: Any, ref: Any, window: np.ndarray) -> None:
+def _stem(
+    score: dict[int, float], state: MonitorState, ref: Reference, window: np.ndarray
+) -> None:
     """Judge a stem that is not where its command asks while the flow fits the stem."""
     for fault in STEM_FAULTS:
         score[fault] += FAIR
@@ -129,10 +136,10 @@ def _stem(score: dict[int, float], state: Any, ref: Any, window: np.ndarray) -> 
     away = np.flatnonzero(size >= STILL_AWAY * np.max(size))
     window = window[: int(away[-1]) + 1]
     x, xm = window['x'], window['xm']
-    opening = state['sign'][R1] < 0.0
+    opening = state.sign[R1] < 0.0
     # stiff: the model moves, the stem does not
     asked, done = spread_of(xm), spread_of(x)
-    sigma = float(ref['stem_law']['gain'] and ref['sd'][0])
+    sigma = float(ref.stem_law.gain and ref.sd[0])
     if asked > 3.0 * sigma and done < STILL * asked:
         score[4] += CLEAR
         score[1] += CLEAR if opening else 0.0
