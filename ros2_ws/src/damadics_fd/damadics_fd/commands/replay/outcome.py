@@ -28,7 +28,7 @@ class Detection(TypedDict):
     onset: float | None
     test: str
     cause: str
-    candidates: list[str]
+    candidates: str
     confidence: float | None
     strength: float | None
     spread: float | None
@@ -102,7 +102,7 @@ def evidence(event: Event, zero: int) -> Detection:
         'onset': (event.onset - zero) / SECOND if event.onset else None,
         'test': event.test,
         'cause': event.cause,
-        'candidates': list(event.candidates),
+        'candidates': ', '.join(event.candidates),
         'confidence': _finite(event.confidence),
         'strength': _finite(event.strength),
         'spread': _finite(event.spread),

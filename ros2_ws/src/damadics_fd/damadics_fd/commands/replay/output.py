@@ -110,8 +110,7 @@ def write_outcomes(outcomes: Sequence[Outcome], path: Path) -> None:
     Write results to a file, with one content in every format.
 
     JSON is a list with one object per recording. CSV and Parquet have one row per detection, and
-    one with an empty `t` for a recording without; `refused`, `problems` and `candidates` are JSON
-    in a cell.
+    one with an empty `t` for a recording without; `refused` and `problems` are JSON in a cell.
 
     :param outcomes: what became of each recording.
     :param path: file; its suffix chooses the format.
@@ -144,8 +143,4 @@ def _rows(outcome: Outcome) -> list[dict[str, object]]:
         'problems': json.dumps(outcome.problems, ensure_ascii=False),
     }
     del about['detections']
-    found = [
-        {**detection, 'candidates': json.dumps(detection['candidates'])}
-        for detection in outcome.detections
-    ]
-    return [about | detection for detection in found] or [about]
+    return [about | detection for detection in outcome.detections] or [about]

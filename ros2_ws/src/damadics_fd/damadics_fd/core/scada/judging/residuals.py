@@ -14,6 +14,7 @@ from damadics_fd.core.scada.state import HISTORY_LENGTH, LAW, N_WEIGHTS, Monitor
 DOUBT = 3.0  # standard deviations of a law that are no evidence
 X = 2  # place of the position among the signals
 NEAR = 0.01  # of the stroke, still where it was learned
+BENT = 0.02  # by which the gain of a stem may be another where it was not learned
 STOP = 0.015  # this near to an end of the stroke the stem is at its stop
 STOP_DOUBT = 0.05  # of the stroke, at a stop and for a while after it has left
 STOP_S = 60.0
@@ -66,6 +67,8 @@ def residuals(
         follow_drift(s, 0, x - xm, STEM_DRIFT, 2.0 * ref.s1)
         doubt = DOUBT * stem_doubt(ref.stem_law, xm) + DOUBT * STEM_HOURS * hours_unseen(ref)
         doubt += transient_doubt(s.track, ref.stem_law)
+        beyond = max(ref.low[X] - xm, xm - ref.high[X], 0.0)
+        doubt += (abs(ref.stem_law.gain - 1.0) + BENT) * beyond
         s.lever[0] = 1.0
     else:
         for i in range(N_WEIGHTS):

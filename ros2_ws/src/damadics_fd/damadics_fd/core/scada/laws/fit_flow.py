@@ -24,6 +24,7 @@ EXPONENT = (0.05, 0.3)  # standard deviation of the exponent's error: best and w
 LAGS = (0.0, 0.7, 1.5, 3.0, 5.0)
 LEAST_FLOW = 0.02  # of the meter's range; below it meters do not measure
 BETTER = 0.9
+METER = 0.002  # of the range: the least noise of a flow meter
 AVERAGED = 5  # samples
 
 
@@ -130,7 +131,7 @@ def fit_flow(
     law = np.zeros(1, FLOW_LAW)
     law['medium'], law['c'], law['lag_s'], law['range'] = medium, c, lag, flow_range
     law['size0'] = float(np.mean(size[good]))
-    law['noise'] = 0.002 * scale
+    law['noise'] = max(METER * scale, _white(flow))
     law['spread'] = max(spread, 1e-3)
     law['v'][0, :KNOTS, :KNOTS] = v
     law['v'][0, KNOTS, KNOTS] = _exponent_doubt(left, size - law['size0'][0]) ** 2
@@ -167,6 +168,12 @@ def _fit(
     # a lag also averages noise, which must not count for it: compare what is slower
     slow = np.convolve(full[good], np.ones(AVERAGED) / AVERAGED, 'valid')
     return spread_of(slow), c, v, full, spread
+
+
+def _white(flow: Floats) -> float:
+    """Return the standard deviation of the noise in a flow from sample to sample."""
+    noise = spread_of(flow[1:-1] - 0.5 * (flow[:-2] + flow[2:])) / math.sqrt(1.5)
+    return noise if math.isfinite(noise) else 0.0
 
 
 def _exponent_doubt(left: Floats, size: Floats) -> float:

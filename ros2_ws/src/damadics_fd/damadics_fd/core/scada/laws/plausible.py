@@ -5,13 +5,15 @@
 import numpy as np
 
 from damadics_fd.core.scada.laws.fit_stem import StemFit
-from damadics_fd.core.scada.laws.robust import Floats
+from damadics_fd.core.scada.laws.robust import Floats, spread_of
 from damadics_fd.core.scada.settings import ScadaSettings
 from damadics_fd.core.scada.state import LAW, Reference
 
 UNKNOWN_GAIN = 0.2  # standard error of the stem's gain above which the record shows no motion
 GAIN = 0.1  # a positioner's gain may differ from 1 by this
 UNRELATED = 0.3  # fitted gain below which the stem does not follow CV
+UNEXPLAINED = 0.45  # share of the deviation of X that a law leaves which does not see the motion
+REACH = 0.3  # by which the reach of the stem may differ from that of CV
 OFFSET = 0.1
 SIGMAS = 4.0
 UNLIKE = 'this does not look like a valve that works'
@@ -37,7 +39,7 @@ def check_stem(fit: StemFit, cv: Floats, x: Floats) -> None:
             'follows it: learn while the valve works'
         )
     slack = max(GAIN, SIGMAS * fit.gain_error)
-    if abs(fit.gain - 1.0) > slack and not (_reach_alike(cv, x, slack) and fit.gain > UNRELATED):
+    if abs(fit.gain - 1.0) > slack and not _too_quick(fit, cv, x):
         raise LearningError(
             f'{UNLIKE}: the stem moves by {fit.gain:.2f} of what CV asks (1 expected): stuck, '
             'bent feedback or a wrong scale; mend it or check the units'
@@ -50,14 +52,16 @@ def check_stem(fit: StemFit, cv: Floats, x: Floats) -> None:
         )
 
 
-def _reach_alike(cv: Floats, x: Floats, slack: float) -> bool:
+def _too_quick(fit: StemFit, cv: Floats, x: Floats) -> bool:
     """
-    Tell whether the stem moves as far as CV does.
+    Tell whether the samples are too rare to show the gain.
 
-    A command that changes between the samples takes away from a fitted gain, not from the reach.
+    A command that changes between the samples takes away from a fitted gain, but then the law
+    leaves much unexplained, while the stem reaches as far as CV does.
     """
     asked, done = (float(np.quantile(v, 0.9) - np.quantile(v, 0.1)) for v in (cv, x))
-    return abs(done - asked) <= slack * asked
+    unexplained = fit.sigma > UNEXPLAINED * spread_of(x)
+    return unexplained and fit.gain > UNRELATED and abs(done - asked) <= REACH * asked
 
 
 def check_flow(ref: Reference, settings: ScadaSettings) -> None:
