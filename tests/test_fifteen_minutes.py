@@ -119,56 +119,78 @@ def replayed(*words: object, code: int = 0) -> list[dict]:
 QUICKLY = [f'--set={name}={value}' for name, value in website.LEARN_QUICKLY.items()]
 
 
-def test_one_command_shows_a_friction_fault(first):
+@pytest.fixture(scope='module')
+def faulted(first):
+    """The same once its friction is flagged."""
     healthy = (FaultFlag.STATE_HEALTHY,)
     assert first.peer.wait(lambda: first.flags and first.flags[-1].state in healthy, 120.0)
-    first.tile.wait(('ok',), 2.0)
-    assert not rises(first)
+    first.tile.wait(('ok',), 20.0)
+    first.early = rises(first)
     client = first.peer.node.create_client(InjectFault, f'/{VALVE}/inject_fault')
     assert first.peer.wait(client.service_is_ready)
     answer = client.call_async(InjectFault.Request(fault=FRICTION, strength=1.0))
     assert first.peer.wait(answer.done)
     assert answer.result().success
     assert first.peer.wait(lambda: first.flags[-1].fault, 30.0), 'the friction is not flagged'
-    assert first.tile.wait(website.ALARM, 5.0) < 1.0
+    first.shown_after = first.tile.wait(website.ALARM, 5.0)
     assert first.peer.wait(lambda: rises(first))
+    return first
 
 
-def test_a_killed_detector_greys_the_tile_and_its_alarm_comes_back(first):
-    occurrence = first.flags[-1].occurrence
-    run = children(first.processes.pid('run'))
+@pytest.fixture(scope='module')
+def restarted(faulted):
+    """The same once its detector was killed and is back."""
+    faulted.occurrence = faulted.flags[-1].occurrence
+    run = children(faulted.processes.pid('run'))
     os.kill(next(child.pid for child in run if child.name == 'detector'), signal.SIGKILL)
-    assert first.tile.wait(('off',), 5.0) < 1.0
-    first.peer.wait(lambda: False, 0.3)
-    before = len(first.flags)
-    first.tile.wait(website.ALARM, 60.0)  # `run` has started it again
-    assert first.peer.wait(lambda: len(first.flags) > before + 2, 30.0)
-    assert all(flag.fault for flag in first.flags[before:]), 'the alarm was lost'
-    assert {flag.occurrence for flag in first.flags[before:]} == {occurrence}
+    faulted.grey_after = faulted.tile.wait(('off',), 5.0)
+    faulted.peer.wait(lambda: False, 0.3)
+    before = len(faulted.flags)
+    faulted.tile.wait(website.ALARM, 60.0)  # `run` has started it again
+    assert faulted.peer.wait(lambda: len(faulted.flags) > before + 2, 30.0)
+    faulted.since = list(faulted.flags[before:])
+    return faulted
 
 
-def test_the_recorded_bag_gives_the_same_flag_time(first):
-    first.peer.wait(lambda: False, 3.0)
-    assert len(rises(first)) == 1, 'the restart raised an alarm'
-    started = children(first.processes.pid('run'))
-    assert {child.name for child in started} == {
+@pytest.fixture(scope='module')
+def ended(restarted):
+    """The same once `run` was ended; its bag is whole."""
+    restarted.peer.wait(lambda: False, 3.0)
+    restarted.started = children(restarted.processes.pid('run'))
+    restarted.processes.end('run', 90.0)
+    restarted.left = [c for c in restarted.started if Path(f'/proc/{c.pid}').exists()]
+    return restarted
+
+
+def test_one_command_shows_a_friction_fault(faulted):
+    assert not faulted.early
+    assert faulted.shown_after < 1.0
+
+
+def test_a_killed_detector_greys_the_tile_and_its_alarm_comes_back(restarted):
+    assert restarted.grey_after < 1.0
+    assert all(flag.fault for flag in restarted.since), 'the alarm was lost'
+    assert {flag.occurrence for flag in restarted.since} == {restarted.occurrence}
+
+
+def test_the_recorded_bag_gives_the_same_flag_time(ended):
+    assert len(rises(ended)) == 1, 'the restart raised an alarm'
+    assert {child.name for child in ended.started} == {
         'recorder',
         'estimator',
         'detector',
         'plant',
         'dashboard',
     }
-    first.processes.end('run', 90.0)
-    left = [child for child in started if Path(f'/proc/{child.pid}').exists()]
-    assert not left, 'processes are left'
-    (result,) = replayed(first.bag, *QUICKLY)
-    assert result['detections'][0]['stamp'] == rises(first)[0]
+    assert not ended.left, 'processes are left'
+    (result,) = replayed(ended.bag, *QUICKLY)
+    assert result['detections'][0]['stamp'] == rises(ended)[0]
 
 
-def test_a_truncated_bag_is_replayed(first):
-    (bag,) = first.bag.glob('*.mcap')
+def test_a_truncated_bag_is_replayed(ended):
+    (bag,) = ended.bag.glob('*.mcap')
     whole = bag.read_bytes()
-    torn = first.folder / 'torn.mcap'
+    torn = ended.folder / 'torn.mcap'
     torn.write_bytes(whole[: len(whole) * 9 // 10])
     verdict = subprocess.run(
         [executable('damadics_fd', 'verify'), str(torn)],
@@ -178,7 +200,7 @@ def test_a_truncated_bag_is_replayed(first):
     )
     assert verdict.returncode == 3, verdict.stdout
     (result,) = replayed(torn, *QUICKLY, code=3)  # something is missing
-    assert result['detections'][0]['stamp'] == rises(first)[0]
+    assert result['detections'][0]['stamp'] == rises(ended)[0]
     assert result['problems']
 
 
