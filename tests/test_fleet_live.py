@@ -140,6 +140,7 @@ def test_fifty_valves_in_one_process(processes, peer, tmp_path):
     arguments = [
         str(path),
         *('--ros-args', '-p', f'expose:={EXPOSED}', '-p', f'alarm_folder:={tmp_path / "alarms"}'),
+        *('-p', f'state_folder:={tmp_path / "states"}'),
     ]
     flags = peer.listen(FaultFlag, f'/{name(FAULTY)}/fault_flag', qos.FLAG)
     residuals = peer.listen(Float64Stamped, f'/{name(FAULTY)}/residual', qos.SAMPLES)
@@ -220,4 +221,28 @@ def test_fifty_valves_in_one_process(processes, peer, tmp_path):
     # silence is not health
     assert peer.wait(lambda: set(fleet.status[-1].state) == {FaultFlag.STATE_NOT_MONITORING})
     processes.end('fleet', 10.0)
-    assert 'internal error' not in processes.log('fleet').read_text()
+
+    # two processes with a part of the list each go on where it was, without learning or an event
+    halves = {'north': range(VALVES // 2), 'south': range(VALVES // 2, VALVES)}
+    status = {}
+    events = []
+    for half, valves in halves.items():
+        file = tmp_path / f'{half}.yaml'
+        file.write_text(
+            yaml.safe_dump({'valves': {name(v): {'settings': settings(v)} for v in valves}})
+        )
+        status[half] = peer.listen(FleetStatus, f'/{half}/fleet/status', qos.FLAG)
+        events.append(peer.listen(FleetEvent, f'/{half}/fleet/fault_event', qos.EVENTS))
+        words = [str(file), *arguments[1:], '-r', f'__ns:=/{half}', '-p', 'expose:=0']
+        processes.start('damadics_fd', 'fleet', words, label=half)
+    assert peer.wait(lambda: all(status.values()), 60.0)
+    assert len(status['north'][-1].state) + len(status['south'][-1].state) == VALVES
+    flagged = [m for m in status['north'][-1].fault]
+    assert flagged == [v == FAULTY for v in halves['north']]
+    assert not any(status['south'][-1].fault)
+    assert status['north'][-1].progress[LEARNING] > 0.0, 'it learns from the beginning'
+    assert not any(events), 'an alarm is told twice'
+    for half in halves:
+        processes.end(half, 10.0)
+    for log in ('fleet', *halves):
+        assert 'internal error' not in processes.log(log).read_text()

@@ -14,8 +14,10 @@ from damadics_fd.core.stamps import DATE, SECOND
 pytest.importorskip('damadics_msgs.msg')
 from damadics_fd.nodes.fleet import blocks, status
 from damadics_fd.nodes.fleet.ages import Ages
+from damadics_fd.nodes.fleet.handover import Handover
 from damadics_fd.nodes.fleet.members import Member, Members, members_of
 from damadics_fd.ros.raw import sample_of
+from damadics_fd.store.alarms import AlarmStore
 from damadics_fd.store.fleet_file import FleetError, Valve
 from damadics_msgs.msg import FaultFlag, Measurement, MeasurementBlock
 from damadics_plant import simulate
@@ -171,3 +173,64 @@ def test_layouts_differ_in_their_version():
     assert one != blocks.layout_version(['/b', '/a'], ['A', 'B'])
     assert one != blocks.layout_version(['/a', '/b'], ['A', 'C'])
     assert 0 < one < 2**32
+
+
+class Silent:
+    """A node as far as logging goes."""
+
+    def __init__(self):
+        self.said = []
+
+    def get_logger(self):
+        return self
+
+    def info(self, text):
+        self.said.append(text)
+
+    warning = error = info
+
+
+def fed(members, columns, rows):
+    """Let all members take the same rows of a recording."""
+    count = rows.stop - rows.start
+    for n in range(len(members)):
+        signals = {name: columns[name][rows] for name in SIGNALS if name in columns}
+        valve = np.full(count, n)
+        yield members.take(blocks.Rows(valve, columns['stamp'][rows], signals))
+
+
+def test_a_valve_goes_on_in_another_process_where_it_was(tmp_path):
+    columns = simulate('paper_spring', rate=400.0, duration=80.0)
+    half = len(columns['stamp']) - 3000
+    alarms = tmp_path / 'alarms'
+    whole = Members([member(5)])
+    told = [list(fed(whole, columns, slice(a, b))) for a, b in ((0, half), (half, half + 3000))]
+    first = Members([member(4), member(5)])
+    list(fed(first, columns, slice(0, half)))
+    node = Silent()
+    Handover(node, first, tmp_path, alarms).give()
+    second = Members([member(5), member(9)])
+    assert Handover(node, second, tmp_path, alarms).take() == {0}
+    assert not list(tmp_path.glob('lv5.state*')), 'it can be taken once'
+    rest = list(fed(second, columns, slice(half, half + 3000)))
+    assert rest[0].happened == told[1][0].happened
+    (bank, place), (alone, _) = second.at(0), whole.at(0)
+    assert str(bank.decisions[place]) == str(alone.decisions[0])
+    assert str(bank.estimates[place]) == str(alone.estimates[0])
+    assert bank.detector(place).save() == alone.detector(0).save()
+    assert bank.counters(place) == alone.counters(0)
+
+
+def test_a_state_that_does_not_fit_or_is_older_than_the_alarm_is_not_taken(tmp_path):
+    members = Members([member(1), member(2)])
+    columns = simulate('nominal', rate=400.0, duration=1.0)
+    list(fed(members, columns, slice(0, 400)))
+    node = Silent()
+    Handover(node, members, tmp_path, None).give()
+    detector = members.at(0)[0].detector(0)
+    detector.state['stamp'] += SECOND
+    AlarmStore(tmp_path / 'lv1.alarm').save(detector.save())
+    other = Member('/lv2', 'LV-2', '', Settings.for_mode('monitor'), None, '')
+    assert Handover(node, Members([member(1), other]), tmp_path, tmp_path).take() == set()
+    assert 'the alarm was kept after it' in node.said[-2]
+    assert 'its settings differ' in node.said[-1]

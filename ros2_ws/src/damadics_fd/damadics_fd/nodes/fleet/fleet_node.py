@@ -18,6 +18,7 @@ from damadics_fd.core.sample import SIGNALS, Sample
 from damadics_fd.core.text import NAME, plain
 from damadics_fd.nodes.fleet import blocks, status
 from damadics_fd.nodes.fleet.ages import Ages
+from damadics_fd.nodes.fleet.handover import Handover
 from damadics_fd.nodes.fleet.jumps import Jumps
 from damadics_fd.nodes.fleet.keeping import Keeping
 from damadics_fd.nodes.fleet.members import Happening, Members, members_of
@@ -65,6 +66,12 @@ class FleetNode(SpinnableNode):
             'auto',
             'folder that keeps the alarms over a restart; "auto": one of the user; "": none',
         )
+        handed = parameters.declare(
+            'state_folder',
+            '',
+            'folder that takes the whole state of each valve when the process ends, and gives it '
+            'to the next process with that valve; "": none',
+        )
         max_age = parameters.declare(
             'max_age',
             0.0,
@@ -80,10 +87,13 @@ class FleetNode(SpinnableNode):
         except FleetError as problem:
             raise StartError(f'{problem}') from problem
         folder = default_folder() if kept == 'auto' else Path(kept).expanduser() if kept else None
-        if folder and (cause := check_folder(folder)):
-            raise StartError(f'fleet cannot keep its alarms: alarm_folder: {cause}')
+        state = Path(handed).expanduser() if handed else None
+        for name, one in (('alarm_folder', folder), ('state_folder', state)):
+            if one and (cause := check_folder(one)):
+                raise StartError(f'fleet cannot keep what it knows: {name}: {cause}')
         self._keeping = Keeping(self, self._members, folder)
-        self._keeping.restore()
+        self._handover = Handover(self, self._members, state, folder)
+        self._keeping.restore(self._handover.take())
         self._refused = blocks.Refused(len(self._members))
         self._judged = self._rejected = 0
         self._ages = Ages(
@@ -215,7 +225,9 @@ class FleetNode(SpinnableNode):
         return Level.OK, 'all valves monitored', values
 
     def destroy_node(self) -> None:
-        """Release the node."""
+        """Judge what was gathered, hand the valves over, and release the node."""
+        self._judge_gathered()
+        self._handover.give()
         self._entities.release()
         super().destroy_node()
 

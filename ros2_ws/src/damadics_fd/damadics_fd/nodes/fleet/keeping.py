@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a fleet keeps over a restart: alarms and references of its valves."""
 
+from collections.abc import Collection
 from pathlib import Path
 
 import numpy as np
@@ -44,10 +45,18 @@ class Keeping:
         alarms = [memory.problem for memory in self._memories.values() if memory.problem]
         return alarms + list(self._unsaved.values())
 
-    def restore(self) -> None:
-        """Take up alarms and references of before, or show what is lost."""
+    def restore(self, but: Collection[int] = ()) -> None:
+        """
+        Take up alarms and references of before, or show what is lost.
+
+        :param but: valves that have their whole state already.
+        """
         names = set(self._names())
+        for number in but:
+            self.keep(number)
         for number, member in enumerate(self._members.all):
+            if number in but:
+                continue
             if member.reference:
                 self._load(number, quiet=True)
             if any(name.startswith(f'{self._file(number)}.') for name in names & self._of(number)):
