@@ -13,7 +13,7 @@ from damadics_dashboard.live.watcher import Watcher
 from damadics_dashboard.pages.fleet_page import fleet_page
 from damadics_dashboard.pages.history_page import history_page
 from damadics_dashboard.pages.replay_page import replay_page
-from damadics_dashboard.pages.valve_page import valve_page
+from damadics_dashboard.pages.valve.valve_page import valve_page
 from damadics_dashboard.report import content, forms
 from damadics_dashboard.words.texts import Texts, preferred, texts
 

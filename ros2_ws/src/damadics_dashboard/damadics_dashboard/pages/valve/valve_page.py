@@ -18,9 +18,9 @@ from damadics_dashboard.pages.elements import box, markup, redraw, tell, with_va
 from damadics_dashboard.pages.frame import card, frame, may_operate
 from damadics_dashboard.pages.plots import Area, Feed, signature
 from damadics_dashboard.pages.report_button import report_button
-from damadics_dashboard.pages.signals import Signals
-from damadics_dashboard.pages.simulator import simulator_panel
-from damadics_dashboard.pages.trend_card import TrendCard
+from damadics_dashboard.pages.valve.signals import Signals
+from damadics_dashboard.pages.valve.simulator import simulator_panel
+from damadics_dashboard.pages.valve.trend_card import TrendCard
 from damadics_dashboard.words.texts import Texts
 from damadics_dashboard.words.valve_words import (
     detail_of,
