@@ -23,7 +23,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from damadics_fd.bag import BagWriter, iter_columns, loading, read_columns, write_columns
+from damadics_fd.bag import BagWriter, iter_columns, read_columns, write_columns
+from damadics_fd.bag.mcap import loading
 from damadics_fd.bag.rosbag2 import qos
 from damadics_fd.core.sample import COLUMNS
 from damadics_plant import simulate

@@ -25,6 +25,8 @@ class Limits:
     :param unpacked: a file that is compressed as a whole or message by message: so many bytes
         whatever its size,
     :param unpacked_ratio: and so many more for each of its bytes.
+    :param walked: fields of messages that are looked at one by one, in a file of any size,
+    :param walked_ratio: and so many more for each of its bytes.
     :param problems: number of damaged places after which the rest is given up.
     """
 
@@ -41,4 +43,6 @@ class Limits:
     yaml: int = 1 << 20
     unpacked: int = 1 << 28
     unpacked_ratio: int = 300
+    walked: int = 1 << 20
+    walked_ratio: int = 4
     problems: int = 10_000

@@ -4,7 +4,6 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import NamedTuple, Self, TypeVar
@@ -12,15 +11,14 @@ from typing import NamedTuple, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from damadics_fd.bag.batch import MESSAGE_HEAD, Batch
 from damadics_fd.bag.cdr import kernels
 from damadics_fd.bag.compressed import Unpacker, is_compressed
 from damadics_fd.bag.errors import BagError
-from damadics_fd.bag.grouping import grouped
 from damadics_fd.bag.limits import Limits
 from damadics_fd.bag.mcap.records import HEAD, Channel, Op, Schema, parse_channel, parse_schema
 
 Kind = TypeVar('Kind', Schema, Channel)
-MESSAGE_HEAD = kernels.BODY_AT  # [B] of a Message record before its data
 
 
 class Problem(NamedTuple):
@@ -28,47 +26,6 @@ class Problem(NamedTuple):
 
     offset: int
     text: str
-
-
-@dataclass
-class Batch:
-    """
-    The messages of one chunk, to be used until the next one is read.
-
-    :param data: Message records, uint8.
-    :param words: the same as words.
-    :param channels: channel number of each message.
-    :param starts: place of the data of each message.
-    :param sizes: size of the data of each message [B].
-    :param offset: place of the chunk in the file.
-    :param places: of the Message records in the chunk as the file has it.
-    """
-
-    data: NDArray[np.uint8]
-    words: kernels.Words
-    channels: NDArray[np.uint16]
-    starts: NDArray[np.int64]
-    sizes: NDArray[np.int64]
-    offset: int
-    places: NDArray[np.int64]
-
-    def log_times(self, rows: NDArray[np.generic] | slice = slice(None)) -> NDArray[np.int64]:
-        """Return the log times of some messages [ns]."""
-        return self.words.w8[self.starts[rows] + kernels.LOG_TIME].view(np.int64)
-
-    def by_channel(self) -> Iterator[tuple[int, NDArray[np.int64]]]:
-        """Yield the channels that have messages, each with the rows of these in order."""
-        yield from grouped(self.channels)
-
-    def beginning(self, row: int) -> bytes:
-        """Return the first bytes of one message."""
-        start = self.starts[row]
-        return self.data[start : start + min(self.sizes[row], 4)].tobytes()
-
-    def message(self, row: int) -> bytes:
-        """Return one serialised message."""
-        start = self.starts[row]
-        return self.data[start : start + self.sizes[row]].tobytes()
 
 
 class MessageFile(ABC):
@@ -96,6 +53,8 @@ class MessageFile(ABC):
         self._once: set[str] = set()
         size = self.path.stat().st_size if self.path.is_file() else 0
         self._unpack = Unpacker(limits, size)
+        self.walked = 0  # fields looked at one by one, because messages differ
+        self.most_walked = limits.walked + limits.walked_ratio * size
 
     def __enter__(self) -> Self:
         """Return the file."""

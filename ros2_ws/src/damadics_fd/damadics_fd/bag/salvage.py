@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from damadics_fd.bag.batch import MESSAGE_HEAD, Batch
 from damadics_fd.bag.cdr.definition import installed_type, schema_text
 from damadics_fd.bag.checking import inspection
 from damadics_fd.bag.checking.inspection import LOSSY, UNUSABLE, WHOLE, Report
@@ -18,7 +19,7 @@ from damadics_fd.bag.limits import Limits
 from damadics_fd.bag.mcap.reader import McapFile
 from damadics_fd.bag.mcap.records import HEAD, Channel, Extent, Op, Schema, parse_attachment
 from damadics_fd.bag.mcap.writer import McapWriter
-from damadics_fd.bag.messages import MESSAGE_HEAD, Batch, MessageFile
+from damadics_fd.bag.messages import MessageFile
 from damadics_fd.bag.opening import open_file
 from damadics_fd.bag.rosbag2 import METADATA_FILE, BagFile, BagMetadata, Topic, parse_qos
 from damadics_fd.bag.sources import bag_files

@@ -9,17 +9,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damadics_fd.bag.arrays import Column, Columns, Places
+from damadics_fd.bag.batch import Batch
 from damadics_fd.bag.cdr import kernels
-from damadics_fd.bag.cdr.definition import Definition, parse_definition
+from damadics_fd.bag.cdr.definition import Definition, Member, parse_definition
+from damadics_fd.bag.cdr.gathering import field, same_layout, time
 from damadics_fd.bag.cdr.groups import Alike, first_message
 from damadics_fd.bag.cdr.kernels import LOG_TIME, Words
-from damadics_fd.bag.cdr.layout import Layout, Place, layout_of
+from damadics_fd.bag.cdr.layout import HEADER_SIZE, Layout, Place, layout_of
 from damadics_fd.bag.compressed import is_compressed
 from damadics_fd.bag.errors import BagError
-from damadics_fd.bag.messages import Batch, MessageFile
+from damadics_fd.bag.messages import MessageFile
 
 MOST_LAYOUTS = 64  # in one chunk, that are looked for by column
+FEW_LAYOUTS = 8  # of a channel, which cost nothing
 MOST_PLACES = 1 << 17  # of the layouts that are remembered
+HEADER = Member('header', 'std_msgs/msg/Header', None)
+STAMPED = {  # what the types begin with
+    'std_msgs/msg/Header': [Member('stamp', 'builtin_interfaces/msg/Time', None)],
+    'builtin_interfaces/msg/Time': [
+        Member('sec', 'int32', None),
+        Member('nanosec', 'uint32', None),
+    ],
+}
+STAMP_END = HEADER_SIZE + 8  # [B] in a message
 _ELEMENT = re.compile(r'\.\d+(\.|$)')  # a member of a sequence of messages: no column
 
 
@@ -53,6 +65,39 @@ class Decoder:
         self.kind = next(iter(self.definition))  # a foreign name may stand in another form
         self._layouts: list[Layout] = []
         self._alike: Alike | None = None
+
+    @property
+    def is_costly(self) -> bool:
+        """Tell whether its messages have differed so much that each has to be looked at."""
+        return len(self._layouts) > FEW_LAYOUTS or self._mcap.walked > self._mcap.limits.walked
+
+    @property
+    def is_stamped(self) -> bool:
+        """Tell whether the messages begin with `header.stamp`, as ROS defines it."""
+        members = self.definition[self.kind][:1]
+        return members == [HEADER] and all(
+            self.definition[name][: len(wanted)] == wanted for name, wanted in STAMPED.items()
+        )
+
+    def stamps(self, batch: Batch, rows: NDArray[np.int64]) -> NDArray[np.int64]:
+        """
+        Return `header.stamp` of messages that begin with it, whatever follows it [ns].
+
+        :param batch: chunk that holds them.
+        :param rows: which of its messages.
+        :raises BagError: where one is too short for it or no CDR.
+        """
+        starts, words = batch.starts[rows], batch.words
+        if (batch.sizes[rows] < STAMP_END).any():
+            raise BagError(f'{self.topic}: a message is shorter than its definition says')
+        big = words.w2[starts] == 0
+        if not (big | (words.w2[starts] == kernels.PLAIN_CDR)).all():
+            raise BagError(f'{self.topic}: a message is not plain CDR')
+        return np.where(
+            big,
+            time(words, starts + HEADER_SIZE, '>'),
+            time(words, starts + HEADER_SIZE, '<'),
+        )
 
     def empty(self) -> Columns:
         """Return columns of no messages."""
@@ -144,10 +189,13 @@ class Decoder:
         for layout in self._layouts:
             if layout.size <= len(message) <= layout.size + 3 and layout.matches(message[None]):
                 return layout
+        if self._mcap.walked > self._mcap.most_walked:
+            raise BagError(f'{self.topic}: too many messages differ from each other', self.path)
         try:
             layout = layout_of(self.definition, self.kind, message.tobytes())
         except BagError as error:
             raise BagError(f'{self.topic}: {error.reason}', self.path) from error
+        self._mcap.walked += len(layout.places)
         self._layouts = [*self._layouts[-MOST_LAYOUTS:], layout]
         while len(self._layouts) > 1 and sum(len(k.places) for k in self._layouts) > MOST_PLACES:
             self._layouts.pop(0)
@@ -155,9 +203,9 @@ class Decoder:
 
     def _columns(self, words: Words, starts: Places, layout: Layout) -> Columns:
         return {
-            name: _time(words, starts + place, layout.order)
+            name: time(words, starts + place, layout.order)
             if isinstance(place, int)
-            else _field(words, starts, place, layout.order)
+            else field(words, starts, place, layout.order)
             for name, place in self._places(layout).items()
         }
 
@@ -188,54 +236,6 @@ class Decoder:
             )
         chosen = [*self.fields, *(['stamp'] if 'stamp' in found else [])]
         return {name: found[name] for name in chosen if name != 'log_time'}
-
-
-def same_layout(words: Words, starts: Places, layout: Layout) -> NDArray[np.bool_]:
-    """Tell which messages have their fields at the places of a layout."""
-    same: NDArray[np.bool_] = words.w2[starts] == (0x0100 if layout.order == '<' else 0)
-    for offset, value in layout.lengths:
-        same &= _ordered(words.w4[starts + offset], layout.order) == value
-    return same
-
-
-def _ordered(values: Column, order: str) -> Column:
-    return values if order == '<' else values.byteswap()
-
-
-def _time(words: Words, at: Places, order: str) -> NDArray[np.int64]:
-    seconds = _ordered(words.w4[at], order).view(np.int32).astype(np.int64)
-    stamps: NDArray[np.int64] = seconds * 10**9 + _ordered(words.w4[at + 4], order)
-    return stamps
-
-
-def _field(words: Words, starts: Places, place: Place, order: str) -> Column:
-    """Gather any field: numbers, arrays, strings."""
-    if place.text and place.dtype == 'u4':
-        return _wide(words, starts, place, order)
-    if place.text:
-        width = place.repeat or 0
-        rows = words.w1[starts[:, None] + (place.offset + np.arange(width))]
-        return np.char.decode(
-            rows.view(f'S{width}')[:, 0] if width else np.zeros(len(rows), 'S1'),
-            'utf-8',
-            'replace',
-        )
-    size = int(place.dtype[1])
-    source: Column = words[(1, 2, 4, 8).index(size)]
-    if place.repeat is None:
-        return _ordered(source[starts + place.offset], order).view(place.dtype)
-    at = starts[:, None] + (place.offset + size * np.arange(place.repeat))
-    return _ordered(source[at], order).view(place.dtype)
-
-
-def _wide(words: Words, starts: Places, place: Place, order: str) -> Column:
-    """Gather a wstring, whose units of UTF-16 take four bytes each."""
-    count = place.repeat or 0
-    if not count:
-        return np.zeros(len(starts), 'U1')
-    units = _ordered(words.w4[starts[:, None] + (place.offset + 4 * np.arange(count))], order)
-    texts = [row.tobytes().decode('utf-16-le', 'replace') for row in units.astype('<u2')]
-    return np.array(texts, 'U')
 
 
 def _merge(groups: list[tuple[NDArray[np.bool_], Columns]]) -> Columns:

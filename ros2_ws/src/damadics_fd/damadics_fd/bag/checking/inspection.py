@@ -9,11 +9,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from damadics_fd.bag.batch import Batch
 from damadics_fd.bag.cdr.decoder import Decoder
 from damadics_fd.bag.checking.timing import Timing
 from damadics_fd.bag.errors import BagError, printable
 from damadics_fd.bag.limits import Limits
-from damadics_fd.bag.messages import Batch, MessageFile
+from damadics_fd.bag.messages import MessageFile
 from damadics_fd.bag.opening import open_file
 from damadics_fd.bag.rosbag2 import METADATA_FILE, read_metadata
 from damadics_fd.bag.sources import bag_files, missing_files
@@ -172,9 +173,7 @@ def _stamp_decoder(file: MessageFile, number: int) -> Decoder | None:
         decoder = Decoder(file, number, [])
     except BagError:
         return None
-    members = decoder.definition.get(decoder.kind, [])
-    has_header = bool(members) and members[0].type == 'std_msgs/msg/Header'
-    return decoder if has_header and members[0].name == 'header' else None
+    return decoder if decoder.is_stamped else None
 
 
 def _note(
@@ -190,8 +189,10 @@ def _note(
     decoder = decoders[number]
     if decoder:
         try:
-            columns = decoder.decode(batch, batch.starts[rows], batch.sizes[rows])
-            stamp = columns.get('stamp', log_time)
+            if decoder.is_costly:
+                stamp = decoder.stamps(batch, rows)
+            else:
+                stamp = decoder.decode(batch, batch.starts[rows], batch.sizes[rows])['stamp']
         except BagError as error:
             file.problem(batch.offset, error.reason)
             decoders[number] = None

@@ -7,9 +7,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from damadics_fd.bag.batch import Batch
 from damadics_fd.bag.mcap.records import HEAD, Extent, Op
 from damadics_fd.bag.mcap.summary import Indexed, Summary
-from damadics_fd.bag.messages import Batch
 
 Read = Callable[[int, int], bytes]  # place, size
 Tell = Callable[[int, str], None]  # place, what is wrong there

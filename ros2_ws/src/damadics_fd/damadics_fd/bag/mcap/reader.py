@@ -10,6 +10,7 @@ from typing import BinaryIO, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from damadics_fd.bag.batch import Batch
 from damadics_fd.bag.cdr import kernels
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.limits import Limits
@@ -30,7 +31,7 @@ from damadics_fd.bag.mcap.search import BEGIN, KNOWN, find_records, follows
 from damadics_fd.bag.mcap.summary import read_summary
 from damadics_fd.bag.mcap.unpack import open_plain
 from damadics_fd.bag.mcap.wellformed import fields_end, well_formed
-from damadics_fd.bag.messages import Batch, MessageFile
+from damadics_fd.bag.messages import MessageFile
 
 LOOSE = 1 << 20  # [B] handled at a time where there are no chunks
 BLOCK = 1 << 24  # [B] of the file checked at a time
