@@ -27,6 +27,7 @@ STEM_DRIFT = 0.01  # of the stroke
 FLOW_DRIFT = 0.1  # of log F
 CALM = 0.5  # of a limit: nothing speaks of a fault
 END = 0.985  # of the meter's range: it shows no more
+AT_END, LEAST_END = 4.0, 0.9  # deviations of its noise below that, but not below this share
 LEAST = 0.03  # of the meter's range: it shows no less
 AGAIN = 2  # times that the largest flow of all was shown: the end of its range
 FOLLOW_S = 600.0  # a process pressure is followed this slowly
@@ -146,7 +147,8 @@ def flow_residual(s: MonitorState, ref: Reference, x: float, flow: float) -> flo
     top = law.range
     if s.top_count >= AGAIN and s.top_flow >= END * ref.flow_max:
         top = min(top, s.top_flow) if top > 0.0 else s.top_flow
-    ended = top > 0.0 and flow >= END * top
+    near = max(min(END * top, top - AT_END * law.noise), LEAST_END * top)
+    ended = top > 0.0 and flow >= near
     if ended:
         low = -math.inf  # the flow may be anything above what is shown
     elif flow < LEAST * scale:
