@@ -12,7 +12,7 @@ FOREIGN := tests/connect/foreign/node_modules/.package-lock.json
 SOURCES := $(shell find ros2_ws/src -type f -not -name '*.pyc' -not -path '*/__pycache__/*' \
 	-not -path '*/test/*' -not -path '*/.pytest_cache/*')
 
-.PHONY: help demo demo-plant dashboard test report campaign-monitor build env lint types docs lock soak attack licences clean fuzz
+.PHONY: help demo demo-plant dashboard test test-random coverage report campaign-monitor build env lint types docs lock soak attack licences clean fuzz
 
 help: ## show what can be made
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 18
@@ -28,6 +28,14 @@ demo-plant: $(BUILT) ## a simulated plant behind OPC UA: a fault, and who hears 
 
 test: $(COMPILED) $(READERS) $(FOREIGN) ## run all tests
 	@$(ENV) && tools/test.sh $(ARGS)
+
+coverage: $(BUILT) ## branch coverage of core and bag: short records as plain Python (minutes)
+	@echo 'Left out: blocks of TYPE_CHECKING, protocols, abstract methods.'
+	@$(ENV) && NUMBA_DISABLE_JIT=1 python -m pytest -q -m plain --cov --cov-report=term-missing $(ARGS) \
+		ros2_ws/src/damadics_fd/test
+
+test-random: $(BUILT) $(READERS) ## all tests in random order, file by file (again: ARGS=--random-order-seed=N)
+	@$(ENV) && python -m pytest -m 'not slow' -o pythonpath=tests --random-order-bucket=module $(ARGS)
 
 report: $(BUILT) ## the benchmark's 44 scenarios x all detectors: docs/results/ (minutes; more: SEEDS=20)
 	@$(ENV) && ros2 run damadics_evaluate evaluate run --out results/campaign --first-seed 1000 --seeds $(SEEDS) --no-report \

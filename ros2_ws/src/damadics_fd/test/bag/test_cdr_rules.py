@@ -11,6 +11,8 @@ from damadics_fd.bag.cdr.definition import parse_definition
 from damadics_fd.bag.cdr.layout import layout_of
 from damadics_fd.bag.mcap.writer import McapWriter
 
+pytestmark = pytest.mark.plain
+
 PARTS = f"""
 {'=' * 80}
 MSG: a/Empty

@@ -13,7 +13,7 @@ from damadics_fd.bag.sources import find_bags
 
 from .bag_support import SIGNALS, needs_messages, simulated
 
-pytestmark = needs_messages
+pytestmark = [needs_messages, pytest.mark.plain]
 
 
 @pytest.mark.parametrize('name', ['a.mcap', 'bag'])

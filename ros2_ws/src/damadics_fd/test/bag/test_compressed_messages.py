@@ -18,6 +18,8 @@ from damadics_fd.commands import verify
 from .bag_support import MEASUREMENT, needs_messages, replayed, stroke
 from .test_damage import SCHEMA
 
+pytestmark = pytest.mark.plain
+
 N = 300
 MODES = ('sized', 'unsized', 'streamed')
 

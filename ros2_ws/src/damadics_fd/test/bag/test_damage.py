@@ -20,6 +20,8 @@ from damadics_fd.bag.salvage import salvage
 from damadics_fd.commands.recover import main as recover
 from damadics_fd.commands.verify import main as verify
 
+pytestmark = pytest.mark.plain
+
 SCHEMA = (
     b'std_msgs/Header header\nfloat64 x1\n'
     + b'=' * 80

@@ -7,6 +7,8 @@ import pytest
 from damadics_fd.bag import BagError
 from damadics_fd.bag.mapping import Scale, Source, parse_maps, parse_source, units_of
 
+pytestmark = pytest.mark.plain
+
 
 def test_maps_name_signal_source_and_factor():
     assert parse_maps(['x1=/a/b.c.d*1e-2', 'cv=CV']) == {

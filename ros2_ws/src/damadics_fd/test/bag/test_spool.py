@@ -14,6 +14,8 @@ from damadics_fd.bag.checking.inspection import WHOLE, inspect
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.writing.spool import Spool
 
+pytestmark = pytest.mark.plain
+
 try:
     type_hash('std_msgs/msg/Float64')
 except BagError:

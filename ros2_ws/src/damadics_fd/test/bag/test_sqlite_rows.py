@@ -14,6 +14,8 @@ from damadics_fd.bag.sqlite.reader import SqliteFile
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+pytestmark = pytest.mark.plain
+
 Row = tuple[int, object, object, object]  # id, topic, time, data
 HEAD = b'\0\1\0\0'
 

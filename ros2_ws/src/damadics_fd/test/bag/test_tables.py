@@ -13,6 +13,8 @@ from damadics_fd.bag.mapping import parse_maps
 from damadics_fd.bag.recording import find_recordings
 from damadics_fd.commands.replay.replay import main
 
+pytestmark = pytest.mark.plain
+
 N = 50
 CV = np.linspace(0.0, 1.0, N)
 START = int(datetime(2026, 11, 25, 14, tzinfo=UTC).timestamp()) * 10**9

@@ -14,7 +14,7 @@ from damadics_fd.bag.rosbag2 import qos
 
 from .bag_support import FAULT_STATE, MEASUREMENT, needs_messages, simulated
 
-pytestmark = needs_messages
+pytestmark = [needs_messages, pytest.mark.plain]
 
 
 def decoded(path: Path, topic: str) -> list:

@@ -12,6 +12,8 @@ from damadics_fd.bag.salvage import salvage
 from .test_conformance import Maker, raw
 from .test_damage import CHUNKS, ROWS, small_bag
 
+pytestmark = pytest.mark.plain
+
 
 def records(data: bytes) -> list[tuple[int, int, int]]:
     """Return opcode, begin and end of each record of a whole file."""

@@ -25,6 +25,8 @@ from damadics_fd.core.signature.state import CAUSES
 
 from .test_alarm import Valve
 
+pytestmark = pytest.mark.plain
+
 SPRING = CAUSES.index('spring_softer')
 FRICTION = CAUSES.index('friction_up')
 

@@ -18,6 +18,8 @@ from hypothesis import settings as profile
 
 from .synthetic import valve
 
+pytestmark = pytest.mark.plain
+
 SETTINGS = Settings.for_mode('monitor', own_alarm=False)
 QUICK = SETTINGS.replace(t_on=0.0, t_w=0.05, t_learn=0.2, travel_min=0.0)
 SIGNALS = ('cv', 'x1', 'p1', 'p2', 't1', 'flow', 'ps')

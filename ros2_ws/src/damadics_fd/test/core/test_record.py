@@ -10,6 +10,8 @@ import pytest
 from damadics_fd.core.jit import jit
 from damadics_fd.core.record import Floats, Ints, Record, Rows
 
+pytestmark = pytest.mark.plain
+
 
 class Filter(Record):
     a: Annotated[Floats, 3]

@@ -2,9 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """The seven signals: the core's names, the message and the simulator's spans agree."""
 
+import pytest
 from damadics_fd.core.sample import COLUMNS, TABLE, Sample
 from damadics_msgs.msg import Measurement
 from damadics_plant.actuator.parameters import RANGES
+
+pytestmark = pytest.mark.plain
 
 
 def test_the_names_are_those_of_the_message():

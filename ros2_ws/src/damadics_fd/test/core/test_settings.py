@@ -9,6 +9,8 @@ from damadics_fd.core.modes import MODES
 from damadics_fd.core.settings import Settings, SettingsError
 from damadics_fd.core.settings.document import ValveDocument
 
+pytestmark = pytest.mark.plain
+
 ROWS = [row for row in Settings.describe() if row['name'] != 'mode']
 TOGETHER = {  # settings that bound one another: what has to change with them
     'decide_m': {'decide_n': 64},

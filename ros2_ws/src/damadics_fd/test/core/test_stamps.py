@@ -2,7 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Stamps: dates and simulated time."""
 
+import pytest
 from damadics_fd.core.stamps import SECOND, another_run, is_date, origin
+
+pytestmark = pytest.mark.plain
 
 NOW = 1_790_000_000 * SECOND
 HOURS_28 = 28 * 3600 * SECOND

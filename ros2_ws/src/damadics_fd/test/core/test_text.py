@@ -7,6 +7,8 @@ from damadics_fd.core.text import plain
 from hypothesis import given
 from hypothesis import strategies as st
 
+pytestmark = pytest.mark.plain
+
 
 @given(st.text(st.characters(codec=None), max_size=500), st.integers(2, 50))
 def test_any_text_becomes_a_short_printable_line(text, limit):
