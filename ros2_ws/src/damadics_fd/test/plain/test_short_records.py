@@ -60,6 +60,7 @@ def test_sample_by_sample_gives_the_same_bits_as_a_whole_record():
     assert (decision.residual, decision.threshold) == (last.residual, last.threshold)
 
 
+@pytest.mark.slow  # it learns a model of ten minutes: for make coverage
 def test_signals_of_a_control_room_whose_stem_sticks():
     n, stuck = 1200, 900
     rng = np.random.default_rng(4)
