@@ -213,6 +213,10 @@ def main(args: Sequence[str] | None = None) -> int:
         with _stop_on_signal() as stop:
             if len(jobs) == 1 and arguments.out.suffix:
                 done = run_one(jobs[0], stop, arguments.scada, bar=not arguments.quiet)
+            elif len(jobs) > 1 and arguments.out.suffix:
+                raise ValueError(
+                    f'--out {arguments.out}: {len(jobs)} scenarios go into a folder: give its name'
+                )
             elif arguments.scada:
                 raise ValueError('--scada: goes with a single scenario and --out FILE')
             else:
@@ -223,6 +227,9 @@ def main(args: Sequence[str] | None = None) -> int:
     if not done:
         print(f'simulate: interrupted; what is in {arguments.out} is valid', file=sys.stderr)
         return _INTERRUPTED
+    if not arguments.quiet:
+        several = f'{len(jobs)} recordings in ' if len(jobs) > 1 else ''
+        print(f'{several}{arguments.out}')
     return 0
 
 

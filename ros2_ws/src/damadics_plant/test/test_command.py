@@ -129,7 +129,9 @@ def test_lists(capsys):
 @pytest.mark.parametrize(
     ('arguments', 'message'),
     [
-        (['f99_S', '--out', 'a.csv'], '--list'),
+        (['zzz', '--out', 'a.csv'], '--list'),
+        (['paper_frictoin', '--out', 'a.csv'], 'do you mean paper_friction?'),
+        (['nominal', 'f4_I', '--out', 'a.csv'], 'go into a folder'),
         (['nominal', '--out', 'a.txt'], 'FILE.csv nor FILE.mcap'),
         (['nominal', '--out', 'a.csv', '--rate', '300'], '400 Hz'),
         (['nominal', '--out', 'a.csv', '--fault', 'f4', '--strength', '3'], '-1..1'),

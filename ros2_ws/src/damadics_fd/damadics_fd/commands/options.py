@@ -4,11 +4,12 @@
 
 import argparse
 from collections.abc import Sequence
+from difflib import get_close_matches
 
 import yaml
 
 from damadics_fd.core.record import Saved
-from damadics_fd.core.settings import SettingsError
+from damadics_fd.core.settings import Settings, SettingsError
 
 
 def add_settings(parser: argparse.ArgumentParser, meaning: str) -> None:
@@ -66,3 +67,22 @@ def settings_in(texts: Sequence[str]) -> Saved:
     if problems:
         raise SettingsError(problems)
     return values
+
+
+def with_suggestions(error: SettingsError) -> str:
+    """
+    Say what is wrong with settings, and for unknown names which one may be meant.
+
+    :param error: of the settings.
+    :return: its text, one line.
+
+    >>> with_suggestions(SettingsError(['tlearn: no such setting']))
+    'tlearn: no such setting: do you mean t_learn?'
+    """
+    known = [str(entry['name']) for entry in Settings.describe()]
+    problems = []
+    for problem in error.problems:
+        name, unknown, _ = problem.partition(': no such setting')
+        near = get_close_matches(name, known, 1) if unknown else []
+        problems.append(problem + (f': do you mean {near[0]}?' if near else ''))
+    return str(SettingsError(problems))

@@ -6,6 +6,7 @@ import argparse
 import signal
 import sys
 import time
+from difflib import get_close_matches
 from pathlib import Path
 
 import rclpy
@@ -81,9 +82,11 @@ def main(args: list[str] | None = None) -> int:
         bag = _bag(options)
         spool = Spool(bag, rotate=options.quota_mb > 0)
         node = Recorder(spool, options.topics)
-        print(f'recording {" ".join(node.topics)} into {bag.path}', flush=True)
+        topics = ' '.join(node.topics) or f'{" ".join(sorted(node.wanted))} (nobody sends it yet)'
+        print(f'recording {topics} into {bag.path}', flush=True)
         _spin(node, spool, stop)
         node.look()
+        seen = [name for name, _ in node.get_topic_names_and_types() if name not in node.wanted]
         spool.close()
     except (BagError, OSError) as error:
         print(f'recorder: {error}', file=sys.stderr)
@@ -105,8 +108,10 @@ def main(args: list[str] | None = None) -> int:
     if spool.error:
         print(f'recorder: cannot write: {spool.error}', file=sys.stderr)
     silent = [name for name in node.wanted if not bag.counts.get(name)]
-    if silent:
-        print(f'recorder: no message came on {" ".join(sorted(silent))}', file=sys.stderr)
+    for name in sorted(silent):
+        near = get_close_matches(name, seen, 1)
+        hint = f': do you mean {near[0]}?' if near else ''
+        print(f'recorder: no message came on {name}{hint}', file=sys.stderr)
     return int(bool(spool.dropped or spool.error))
 
 

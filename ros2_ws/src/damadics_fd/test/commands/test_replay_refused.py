@@ -25,12 +25,13 @@ from ..bag.bag_support import as_csv, needs_messages, replayed, stroke
         (['x.csv', '--map', 'cv'], 'write SIGNAL='),
         (['x.csv', '--map', 'cv=none'], 'there is no such column'),
         (['x.csv', '--set', 'k1=-1', '--set', 'bogus=2'], r'bogus: no such setting.*k1 = -1'),
+        (['x.csv', '--set', 'tlearn=3'], r'do you mean t_learn\?'),
     ],
 )
 def test_errors_are_one_line_on_stderr(args, reason, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path('x.csv').write_text('a,b\n1,2\n')
-    assert main(args) == 1
+    assert main(args) == (2 if '--set' in args else 1)
     error = capsys.readouterr().err
     assert error.startswith('replay: ')
     assert error.count('\n') == 1

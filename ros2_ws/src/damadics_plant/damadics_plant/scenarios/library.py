@@ -4,6 +4,7 @@
 
 import re
 from dataclasses import replace
+from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
 
@@ -48,7 +49,9 @@ def load_scenario(name: str) -> Scenario:
         )
     path, extension, entry = name.partition('.yaml')
     if not extension:
-        raise ScenarioError(f'scenario: there is no {name!r}; see --list, or give FILE.yaml:NAME')
+        near = get_close_matches(name, scenario_names(), 1)
+        hint = f'do you mean {near[0]}?' if near else 'see --list, or give FILE.yaml:NAME'
+        raise ScenarioError(f'scenario: there is no {name!r}; {hint}')
     scenarios = read_scenarios(Path(path + '.yaml'))
     entry = entry.lstrip(':')
     if not entry and len(scenarios) == 1:

@@ -102,7 +102,8 @@ class TrendCard:
         first = float(found.start[0]) if len(found.start) else since
         shown = [max(since, first - found.length), now]
         tell('push', {self._plot.id: {'all': True, 'series': series, 'from': [], 'range': shown}})
-        self._words.set_text(outlook_words(quantity, found, limits, now, self._t))
+        words = outlook_words(quantity, found, limits, now, self._t) if len(found.start) else ''
+        self._words.set_text(words)  # without a trend the plot itself says so
 
 
 def _points(found: Series, values: np.ndarray) -> Points:

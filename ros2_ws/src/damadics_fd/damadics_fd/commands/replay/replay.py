@@ -21,7 +21,12 @@ from damadics_fd.bag.checking.inspection import LOSSY
 from damadics_fd.bag.errors import BagError, NoMeasurementError, printable
 from damadics_fd.bag.mcap import loading
 from damadics_fd.bag.recording import Recording, find_recordings, parse_maps
-from damadics_fd.commands.options import add_settings, add_sources, settings_in
+from damadics_fd.commands.options import (
+    add_settings,
+    add_sources,
+    settings_in,
+    with_suggestions,
+)
 from damadics_fd.commands.replay.bags import Plan, replay, warm_up
 from damadics_fd.commands.replay.outcome import Outcome
 from damadics_fd.commands.replay.output import (
@@ -121,6 +126,8 @@ def arguments(args: list[str] | None = None) -> argparse.Namespace:
         help='with --live: publish no results, for nodes that run',
     )
     options = parser.parse_args(args)
+    if options.jobs < 1:
+        parser.error(f'--jobs {options.jobs}: give 1 or more')
     if options.live and (options.out or options.figures or options.bag):
         parser.error('--live writes no files: leave out --out, --figures and --bag')
     if not options.live and (options.rate is not None or options.inputs_only):
@@ -217,7 +224,10 @@ def main(args: list[str] | None = None) -> int:
             report_problems(outcome.problems)
         if options.out:
             write_outcomes(outcomes, options.out)
-    except (BagError, SettingsError, ReferenceFileError, RuntimeError, OSError) as error:
+    except SettingsError as error:
+        print(f'replay: {with_suggestions(error)}', file=sys.stderr)
+        return 2
+    except (BagError, ReferenceFileError, RuntimeError, OSError) as error:
         print(f'replay: {error}', file=sys.stderr)
         return 1
     except KeyboardInterrupt:
