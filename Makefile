@@ -32,7 +32,7 @@ test: $(COMPILED) $(READERS) $(FOREIGN) ## run all tests
 coverage: $(BUILT) ## branch coverage of core and bag: short records as plain Python (minutes)
 	@echo 'Left out: blocks of TYPE_CHECKING, protocols, abstract methods.'
 	@$(ENV) && NUMBA_DISABLE_JIT=1 python -m pytest -q -m plain --cov --cov-report=term-missing $(ARGS) \
-		ros2_ws/src/damadics_fd/test
+		$(addprefix ros2_ws/src/damadics_fd/test/,bag core plain)
 
 test-random: $(BUILT) $(READERS) ## all tests in random order, file by file (again: ARGS=--random-order-seed=N)
 	@$(ENV) && python -m pytest -m 'not slow' -o pythonpath=tests --random-order-bucket=module $(ARGS)

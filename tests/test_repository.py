@@ -10,6 +10,18 @@ from xml.etree import ElementTree
 import pytest
 
 ROOT = Path(__file__).parents[1]
+MOST_LINES = 350
+MOST_FILES = 16  # of a package folder, __init__ included
+
+
+def tracked(*patterns):
+    """List the files that git knows, or those in place where this is no checkout."""
+    done = subprocess.run(
+        ['git', 'ls-files', '--', *patterns], cwd=ROOT, capture_output=True, text=True
+    )
+    if done.returncode:
+        pytest.skip('this is no git checkout')
+    return [ROOT / name for name in done.stdout.splitlines() if (ROOT / name).is_file()]
 
 
 def test_the_version_is_the_same_everywhere():
@@ -29,6 +41,24 @@ def test_the_version_is_the_same_everywhere():
 def test_no_setup_file_repeats_the_version():
     for path in ROOT.glob('ros2_ws/src/*/setup.py'):
         assert "findtext('version')" in path.read_text(), path
+
+
+def test_no_python_file_is_too_long():
+    long = {
+        str(path.relative_to(ROOT)): lines
+        for path in tracked('*.py')
+        if (lines := len(path.read_text().splitlines())) > MOST_LINES
+    }
+    assert not long
+
+
+def test_no_package_folder_holds_too_many_files():
+    counts = {}
+    for path in tracked('ros2_ws/src/*.py'):
+        if '/test/' not in path.as_posix():
+            counts[path.parent] = counts.get(path.parent, 0) + 1
+    full = {str(p.relative_to(ROOT)): n for p, n in counts.items() if n > MOST_FILES}
+    assert not full
 
 
 def test_no_file_names_a_place_of_one_machine_or_a_registry():

@@ -21,8 +21,8 @@ from damadics_fd.bag import rosbag2
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.rosbag2 import Topic
 from damadics_fd.bag.writing.spool import Spool
-from damadics_fd.nodes.loss_count import Sequence
 from damadics_fd.ros.graph_events import GraphEvents
+from damadics_fd.ros.loss_count import Sequence
 
 DEPTH = 100_000  # messages that may wait in the middleware while this process is held up
 LOOK_PERIOD = 0.1  # [s] from a change of the graph to a look at it, at most

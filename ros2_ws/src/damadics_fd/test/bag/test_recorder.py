@@ -19,7 +19,7 @@ from .bag_support import needs_messages
 
 rclpy = pytest.importorskip('rclpy')
 pytest.importorskip('damadics_msgs.msg')
-from damadics_fd.nodes.loss_count import Sequence  # noqa: E402
+from damadics_fd.ros.loss_count import Sequence  # noqa: E402
 from damadics_msgs.msg import FaultFlag, Float64Stamped, Measurement  # noqa: E402
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402

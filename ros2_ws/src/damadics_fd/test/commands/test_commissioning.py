@@ -9,8 +9,8 @@ from damadics_fd.commands.commission.command import main
 from damadics_fd.commands.commission.errors import CommissioningError
 from damadics_fd.commands.commission.limit import _gumbel, _level
 from damadics_fd.commands.commission.monitor import identify
-from damadics_fd.core.identified import FaultFree
 from damadics_fd.core.settings import Settings
+from damadics_fd.core.settings.identified import FaultFree
 from damadics_fd.store.references import load_reference
 
 from ..core.synthetic import KL, valve

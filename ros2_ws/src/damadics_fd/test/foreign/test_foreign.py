@@ -8,9 +8,9 @@ from damadics_fd.commands.commission.balance import find_balance
 from damadics_fd.commands.commission.errors import CommissioningError
 from damadics_fd.commands.commission.signals import gather
 from damadics_fd.commands.commission.twin import twin
-from damadics_fd.core.identified import FaultFree
 from damadics_fd.core.monitor import run
 from damadics_fd.core.settings import Settings
+from damadics_fd.core.settings.identified import FaultFree
 
 from . import courses, kinds
 from . import valve as foreign

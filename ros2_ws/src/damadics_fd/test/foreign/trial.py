@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from damadics_fd.commands.commission.monitor import identify
 from damadics_fd.core.decision.alarm import RAISED
-from damadics_fd.core.identified import FaultFree
 from damadics_fd.core.monitor import run
 from damadics_fd.core.settings import Settings
+from damadics_fd.core.settings.identified import FaultFree
 from damadics_fd.core.signature.signature import Signature
 
 from . import courses

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from damadics_fd.commands.commission import command as commission
 from damadics_fd.commands.replay import replay
-from damadics_fd.core.identified import OK, REFUSED, FaultFree
 from damadics_fd.core.scada.estimator import scada_settings
 from damadics_fd.core.scada.laws.identify import identify
 from damadics_fd.core.scada.monitor import ScadaMonitor
 from damadics_fd.core.scada.state import Reference
 from damadics_fd.core.settings import Settings
+from damadics_fd.core.settings.identified import OK, REFUSED, FaultFree
 from fluids import control_valve
 from foreign_valve import VAPOUR, WATER, Kind, capacity, load, mass_flow, record
 

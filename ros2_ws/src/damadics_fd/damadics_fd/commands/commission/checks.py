@@ -8,10 +8,10 @@ import numpy as np
 
 from damadics_fd.commands.commission.errors import CommissioningError
 from damadics_fd.commands.commission.signals import NEEDED, Blocks
-from damadics_fd.core.identified import FaultFree
 from damadics_fd.core.record import Floats
 from damadics_fd.core.result import Columns
 from damadics_fd.core.settings import Settings
+from damadics_fd.core.settings.identified import FaultFree
 
 TRAVEL = 0.2  # of the stroke, at least
 CLEARLY, STRONGLY = 0.2, 0.5  # correlation from which a direction counts

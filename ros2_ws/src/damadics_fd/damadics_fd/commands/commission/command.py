@@ -17,9 +17,9 @@ from damadics_fd.commands.commission.plot import draw
 from damadics_fd.commands.commission.twin import write_twin
 from damadics_fd.commands.commission.valve_file import parameter_file
 from damadics_fd.commands.options import add_settings, add_sources, settings_in
-from damadics_fd.core.identified import REFUSED, FaultFree, Identified
 from damadics_fd.core.record import Floats, Ints
 from damadics_fd.core.settings import Settings, SettingsError
+from damadics_fd.core.settings.identified import REFUSED, FaultFree, Identified
 from damadics_fd.ros.arguments import command_parser
 from damadics_fd.store.references import Reference, save_reference
 

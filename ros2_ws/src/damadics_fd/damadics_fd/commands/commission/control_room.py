@@ -7,9 +7,9 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from damadics_fd.commands.commission.errors import CommissioningError
-from damadics_fd.core.identified import FaultFree, Identified
 from damadics_fd.core.scada.laws.identify import identify as identify_valve
 from damadics_fd.core.settings import Settings
+from damadics_fd.core.settings.identified import FaultFree, Identified
 
 LEAST = 1800.0  # s of records: half an hour
 NEEDED = ('cv', 'x1')

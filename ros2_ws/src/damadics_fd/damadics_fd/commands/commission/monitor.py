@@ -28,10 +28,10 @@ from damadics_fd.commands.commission.verdict import (
     sheet_differs,
     smallest,
 )
-from damadics_fd.core.identified import LIMITED, OK, REFUSED, FaultFree, Identified
 from damadics_fd.core.monitor import run
 from damadics_fd.core.result import Columns, Result
 from damadics_fd.core.settings import Settings
+from damadics_fd.core.settings.identified import LIMITED, OK, REFUSED, FaultFree, Identified
 from damadics_fd.core.signature.settings import MIN_RATE
 
 SAME_SPRING = 0.05  # share by which the stiffness of recordings of one valve may differ

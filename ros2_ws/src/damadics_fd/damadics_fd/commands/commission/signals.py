@@ -9,8 +9,8 @@ import numpy as np
 
 from damadics_fd.commands.commission.errors import CommissioningError
 from damadics_fd.core.approximator.transmitter import delay_column
-from damadics_fd.core.identified import FaultFree
 from damadics_fd.core.record import Floats, Ints
+from damadics_fd.core.settings.identified import FaultFree
 
 NEEDED = ('cv', 'x1', 'p1', 'p2', 'ps')
 APART = 60.0  # s between two recordings on the common axis

@@ -11,9 +11,9 @@ from damadics_fd.commands.commission.monitor import Proposal
 from damadics_fd.commands.commission.regression import regressor
 from damadics_fd.commands.commission.signals import Blocks, Signals, blocks, gather
 from damadics_fd.commands.commission.valve_file import quoted, value_text
-from damadics_fd.core.identified import FaultFree
 from damadics_fd.core.record import Floats
 from damadics_fd.core.settings import Settings
+from damadics_fd.core.settings.identified import FaultFree
 
 ATMOSPHERE, GAS = 101325.0, 287.0 * 293.0  # Pa; R T of air [J/kg]
 FINE, SHORT = 0.2, 0.05  # s

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The file of a valve: what differs from the defaults, tag and reference, and the verdict."""
 
-from damadics_fd.core.identified import Identified
 from damadics_fd.core.record import Plain
 from damadics_fd.core.settings import Settings
+from damadics_fd.core.settings.identified import Identified
 
 WIDTH = 96
 

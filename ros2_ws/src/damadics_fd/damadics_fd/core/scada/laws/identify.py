@@ -7,7 +7,6 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from damadics_fd.core.identified import LIMITED, OK, REFUSED, FaultFree, Identified
 from damadics_fd.core.record import Plain
 from damadics_fd.core.scada.estimator import scada_settings
 from damadics_fd.core.scada.judging.residuals import DOUBT, FLOW_HOURS, HOURS_S, STEM_HOURS
@@ -22,6 +21,7 @@ from damadics_fd.core.scada.samples import scada_samples
 from damadics_fd.core.scada.settings import ScadaSettings
 from damadics_fd.core.scada.state import LAW, Reference
 from damadics_fd.core.settings import Settings
+from damadics_fd.core.settings.identified import LIMITED, OK, REFUSED, FaultFree, Identified
 
 BETWEEN_S = 3600.0  # set between recordings, so that none runs on into the next
 NAMES = ('t', 'cv', 'x1', 'p1', 'p2', 't1', 'flow')
