@@ -89,6 +89,18 @@ def test_a_foreign_valve_is_watched_without_alarm_and_its_fault_named(change):
         assert np.isnan(t.size) or t.size == pytest.approx(t.true, rel=0.15)
 
 
+def test_stated_deviations_cover_the_truth():
+    missed = []
+    for seed in range(140, 146):
+        build = kinds.random_valve(seed)
+        proposal = commissioned(build, seed)
+        for fault in ('friction +100 %', 'dry +300 %', 'spring -20 %'):
+            t = trial(build, proposal, fault, seed, quiet=600.0)
+            if not np.isnan(t.size) and not abs(t.size - t.true) <= 2.0 * t.std:
+                missed.append((seed, fault, t.size, t.std))
+    assert len(missed) <= 2, missed
+
+
 @pytest.mark.parametrize('wrong', ['stroke', 'stiffness', 'area', 'everything'])
 def test_constants_of_another_valve_never_arm(wrong):
     build = kinds.CATALOGUE['G100' if wrong == 'everything' else 'G38']

@@ -17,7 +17,7 @@ from damadics_fd.core.signature.cues import forget_stick, restart_cues
 from damadics_fd.core.signature.evidence import clear_set, look, restart_sets
 from damadics_fd.core.signature.phase import enter
 from damadics_fd.core.signature.settings import SignatureSettings
-from damadics_fd.core.signature.size import joint_change
+from damadics_fd.core.signature.size import MODEL_FRICTION, MODEL_SPRING, at_most, joint_change
 from damadics_fd.core.signature.state import (
     CAUSE_FRICTION_DOWN,
     CAUSE_FRICTION_UP,
@@ -192,9 +192,10 @@ def material(s: State, c: SignatureSettings, before: bool) -> bool:
     if math.isnan(s.cause_value):
         return True
     share = HYSTERESIS if before else 1.0
-    most = abs(s.cause_value) + 2.0 * s.cause_std
     if s.cause in (CAUSE_FRICTION_UP, CAUSE_FRICTION_DOWN):
+        most = at_most(s.cause_value, s.cause_std, MODEL_FRICTION)
         return bool(most >= share * c.material_friction)
     if s.cause in (CAUSE_SPRING_STIFFER, CAUSE_SPRING_SOFTER):
+        most = at_most(s.cause_value, s.cause_std, MODEL_SPRING)
         return bool(most >= share * c.material_spring)
     return True

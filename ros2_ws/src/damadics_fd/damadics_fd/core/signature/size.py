@@ -27,8 +27,26 @@ from damadics_fd.core.signature.state import (
 
 UNKNOWN = 0.2  # relative deviation of the unit from which no size is stated
 APART = 4.0  # deviations by which dry and viscous friction must have changed differently
+# what a size is in error because no valve rubs and springs as the model says, as a share of it
+MODEL_FRICTION, MODEL_SPRING = 0.08, 0.01
 JOINT_COLUMNS = np.array([X1, ONE, SIGN, V])
 JOINT_EVIDENCE = 60.0  # blocks
+
+
+@jit
+def at_most(value: float, std: float, share: float) -> float:
+    """
+    Return how large a change is at most, by what its data leave open.
+
+    The model's own error is no reason to call a change larger than it was found.
+
+    :param value: change.
+    :param std: its standard deviation.
+    :param share: MODEL_FRICTION or MODEL_SPRING, which `std` holds.
+    :return: two standard deviations of the data above its size.
+    """
+    model = share * value
+    return abs(value) + 2.0 * math.sqrt(max(std * std - model * model, 0.0))
 
 
 @jit
@@ -78,12 +96,15 @@ def physical_value(s: State, c: SignatureSettings, m: int, h: int) -> tuple[floa
         leads = abs(s.dry[m]) * F_dry > 0.5 * abs(value) * F_unit
         if told and leads and cov[SIGN, SIGN] < (UNKNOWN * F_dry) ** 2:
             ratio = max(s.theta[SIGN], SMALL_FRICTION) / F_dry
-            return in_units(s.dry[m], s.dry_sd[m], ratio, cov[SIGN, SIGN] / (F_dry * F_dry))
+            known = cov[SIGN, SIGN] / (F_dry * F_dry) + MODEL_FRICTION * MODEL_FRICTION
+            return in_units(s.dry[m], s.dry_sd[m], ratio, known)
         std = math.sqrt(std * std + s.apart_sd[m] * s.apart_sd[m])
-        return in_units(value, std, F / F_unit, variance / (F_unit * F_unit))
+        known = variance / (F_unit * F_unit) + MODEL_FRICTION * MODEL_FRICTION
+        return in_units(value, std, F / F_unit, known)
     if h == SPRING:
         K = s.unit[X1]
-        return in_units(value, std, s.theta[X1] / K, s.unit_cov[X1, X1] / (K * K))
+        known = s.unit_cov[X1, X1] / (K * K) + MODEL_SPRING * MODEL_SPRING
+        return in_units(value, std, s.theta[X1] / K, known)
     if h == PRELOAD:
         force = c.force_scale if c.diaphragm_area > 0.0 else -c.force_scale  # the spring closes
         return value * force, std * c.force_scale
