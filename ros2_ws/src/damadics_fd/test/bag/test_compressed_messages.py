@@ -153,3 +153,29 @@ def test_replay_gives_the_same_result(tmp_path):
     assert expected['detections']
     assert found['detections'] == expected['detections']
     assert verify.main([str(folder)]) == WHOLE
+
+
+@pytest.mark.parametrize('compression', ['NONE', 'FILE', 'MESSAGE', 'STORAGE'])
+@pytest.mark.parametrize('storage', ['MCAP', 'SQLITE3'])
+@pytest.mark.parametrize('version', [8, 9])
+def test_bags_of_rosbags_in_every_form_are_whole(version, storage, compression, tmp_path):
+    rosbag2 = pytest.importorskip('rosbags.rosbag2')
+    typesys = pytest.importorskip('rosbags.typesys')
+    if (storage, compression) == ('SQLITE3', 'STORAGE'):
+        pytest.skip('there is no such bag')
+    store = typesys.get_typestore(typesys.Stores.ROS2_JAZZY)
+    kind = 'std_msgs/msg/Float64'
+    plugin = rosbag2.StoragePlugin[storage]
+    writer = rosbag2.Writer(tmp_path / 'bag', version=version, storage_plugin=plugin)
+    if compression != 'NONE':
+        mode = rosbag2.CompressionMode[compression]
+        writer.set_compression(mode, rosbag2.CompressionFormat.ZSTD)
+    with writer:
+        connection = writer.add_connection('/a', kind, typestore=store)
+        for i in range(N):
+            data = store.serialize_cdr(store.types[kind](float(i)), kind)
+            writer.write(connection, i, data)
+    report = inspect(tmp_path / 'bag')
+    assert (report.code, report.messages) == (WHOLE, N), report.problems
+    assert read_columns(tmp_path / 'bag', '/a')['data'].tolist() == list(range(N))
+    assert salvage(tmp_path / 'bag', tmp_path / 'saved').code == WHOLE

@@ -63,6 +63,12 @@ def clock(i: int) -> str:
     return datetime.fromtimestamp(seconds, UTC).strftime('%H:%M:%S') + f'.{rest // 10**6:03d}'
 
 
+def basic(i: int) -> str:
+    seconds, rest = divmod(int(STAMP[i]), 10**9)
+    text = datetime.fromtimestamp(seconds, UTC).strftime('%Y%m%dT%H%M%S')
+    return f'{text}.{rest // 10**6:03d}Z'
+
+
 PLAIN = 't,cv,x1,ps'
 DATED = {
     'seconds since 1970': rows('time,cv,x1,ps', lambda i: repr(float(STAMP[i] / 1e9))),
@@ -86,6 +92,15 @@ DATED = {
         'time,cv,x1,ps\n,%,%,kPa', lambda i: iso(STAMP[i]), scales=(100, 100, 1e-3)
     ),
     'quoted': rows('"time","cv","x1","ps"', lambda i: f'"{iso(STAMP[i])}"'),
+    'ISO 8601 without signs between': rows(PLAIN, basic),
+    'name of a zone': rows(PLAIN, lambda i: iso(STAMP[i], '+01:00[Europe/Berlin]', ahead=1)),
+    'month first': rows(PLAIN, lambda i: f'"Nov 25, 2026 {clock(i)}"'),
+    'weekday': rows(PLAIN, lambda i: f'"Wed, 25 Nov 2026 {clock(i)}"'),
+    'units behind a slash': rows(
+        't/s,cv/%,x1 / %,ps/bar', lambda i: repr(float(STAMP[i] / 1e9)), scales=(100, 100, 1e-5)
+    ),
+    'capitals': rows('Time,CV,X1,PS', lambda i: iso(STAMP[i])),
+    'milliseconds by name': rows('time_ms,cv,x1,ps', lambda i: str(STAMP[i] // 10**6)),
     'tabs': rows('time\tcv\tx1\tps', lambda i: iso(STAMP[i]), '\t'),
 }
 

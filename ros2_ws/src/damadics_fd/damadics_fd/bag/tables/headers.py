@@ -63,6 +63,9 @@ LUBLIN = tuple(
     ).split()
 )
 _UNIT = re.compile(r'(.+?)\s*[\[(]([^\[\]()]+(?:\([ag]\))?)[\])]\s*')
+_TIME_UNIT = re.compile(r'(t|time|timestamp|zeit)_(s|ms|us|ns)', re.IGNORECASE)
+_SLASH = re.compile(r'(.+?)\s*/\s*([^\s/]+)')  # t/s, p / bar
+_KNOWN = {unit.lower() for signal in (*SIGNALS, 't') for unit in units_of(signal)} - {'1'}
 
 
 @dataclass(frozen=True)
@@ -100,7 +103,9 @@ def headers(cells: Sequence[str], units: Sequence[str] = ()) -> list[Header]:
     found = []
     for i, cell in enumerate(cells):
         text = ' '.join(cell.replace('\ufeff', '').split())
-        match = _UNIT.fullmatch(text)
+        match = _UNIT.fullmatch(text) or _TIME_UNIT.fullmatch(text)
+        if not match and (parted := _SLASH.fullmatch(text)) and parted[2].lower() in _KNOWN:
+            match = parted
         below = units[i].strip().strip('[]()') if i < len(units) else ''
         found.append(Header(text, *((match[1], match[2]) if match else (text, below))))
     return found
@@ -184,11 +189,14 @@ def assign(
     """
     own: dict[str, Use] = {}
     for i, header in enumerate(names):
+        known = header.name.lower()
         if header.name in OWN:
             own[header.name] = Use(i, header.scale(header.name))
         elif header.name in _SCALED:
             signal, usual = _SCALED[header.name]
             own[signal] = Use(i, header.scale(signal) if header.unit else usual)
+        elif known in OWN and known not in own:  # X1
+            own[known] = Use(i, header.scale(known))
     time, scale = _time_of(names)
     for target, source in chosen.items():
         column = _find(names, target, source)

@@ -11,18 +11,30 @@ from damadics_fd.bag.errors import BagError
 NANO = 10**9
 _MONTHS = ('jan', 'feb', 'mar', 'apr', 'may', 'jun', 'jul', 'aug', 'sep', 'oct', 'nov', 'dec')
 _GERMAN = {'mrz': 'mar', 'mär': 'mar', 'mai': 'may', 'okt': 'oct', 'dez': 'dec'}
+_ZONE = r'(?P<zone>Z|UTC|GMT|[+-]\d{2}(?::?\d{2})?)?'
 _CLOCK = (
     r'(?:[T\s,]+(?P<h>\d{1,2}):(?P<m>\d{2})(?::(?P<s>\d{2})(?:[.,:](?P<f>\d{1,9}))?)?'
-    r'\s*(?P<half>[AaPp]\.?[Mm]\.?)?\s*(?P<zone>Z|UTC|GMT|[+-]\d{2}(?::?\d{2})?)?)?'
+    rf'\s*(?P<half>[AaPp]\.?[Mm]\.?)?\s*{_ZONE})?'
 )
 _SHAPES = (
     re.compile(rf'(?P<y>\d{{4}})[-/.](?P<mo>\d{{1,2}})[-/.](?P<d>\d{{1,2}}){_CLOCK}'),
     re.compile(rf'(?P<y>\d{{4}})(?P<mo>\d{{2}})(?P<d>\d{{2}}){_CLOCK}'),
+    re.compile(  # ISO 8601 without signs between
+        r'(?P<y>\d{4})(?P<mo>\d{2})(?P<d>\d{2})T?(?P<h>\d{2})(?P<m>\d{2})(?P<s>\d{2})'
+        rf'(?:[.,](?P<f>\d{{1,9}}))?(?P<half>)\s*{_ZONE}'
+    ),
+    re.compile(rf'(?P<mon>[A-Za-zä]{{3}})\w*\.?\s+(?P<d>\d{{1,2}}),?\s+(?P<y>\d{{4}}){_CLOCK}'),
     re.compile(rf'(?P<d>\d{{1,2}})\.(?P<mo>\d{{1,2}})\.(?P<y>\d{{2,4}}){_CLOCK}'),
     re.compile(
         rf'(?P<d>\d{{1,2}})[-\s.]+(?P<mon>[A-Za-zä]{{3}})\w*[-\s.,]+(?P<y>\d{{2,4}}){_CLOCK}'
     ),
     re.compile(rf'(?P<a>\d{{1,2}})/(?P<b>\d{{1,2}})/(?P<y>\d{{2,4}}){_CLOCK}'),
+)
+_NOISE = re.compile(  # a weekday before the date, the name of a zone behind its offset
+    r'^(?:mon|tue|wed|thu|fri|sat|sun)[a-z]*,?\s+|\[[\w/+-]+\]$', re.IGNORECASE
+)
+_DIGITS = re.compile(
+    r'(?:19|20)\d\d(?:0[1-9]|1[0-2])(?:0[1-9]|[12]\d|3[01])(?:[01]\d|2[0-3])[0-5]\d[0-5]\d'
 )
 
 
@@ -39,7 +51,7 @@ class Dates:
 
     def __init__(self, sample: Sequence[str]):
         self._day_first = False
-        slashed = [match for text in sample if (match := _SHAPES[-1].fullmatch(text.strip()))]
+        slashed = [match for text in sample if (match := _SHAPES[-1].fullmatch(_plain(text)))]
         if slashed:
             first = max(int(match['a']) for match in slashed)
             second = max(int(match['b']) for match in slashed)
@@ -64,7 +76,7 @@ class Dates:
         >>> Dates([])('2026-11-25 14:00:00.5+01:00')
         1795611600500000000
         """
-        text = text.strip().strip('"')
+        text = _plain(text)
         for shape in _SHAPES:
             if match := shape.fullmatch(text):
                 return self._stamp(match)
@@ -98,6 +110,11 @@ class Dates:
         return int(datetime(year, month, day, tzinfo=UTC).timestamp()) * NANO
 
 
+def _plain(text: str) -> str:
+    """Return a cell without quotes and without what says nothing."""
+    return _NOISE.sub('', text.strip().strip('"').strip())
+
+
 def _zone(text: str | None) -> int:
     """Return the seconds by which a zone is ahead of UTC."""
     if not text or text in ('Z', 'UTC', 'GMT'):
@@ -112,12 +129,12 @@ def is_date(text: str) -> bool:
     """
     Tell whether a cell is a date, with or without a time of day.
 
-    >>> is_date('25.11.2026 14:00:01,5'), is_date('25-Nov-26 14:00'), is_date('12,5')
+    >>> is_date('25.11.2026 14:00:01,5'), is_date('20261125140001'), is_date('1795615200000')
     (True, True, False)
     """
-    text = text.strip().strip('"')
+    text = _plain(text)
     if text.isdigit():
-        return False  # of such a number nobody knows
+        return bool(_DIGITS.fullmatch(text))  # of other numbers nobody knows
     return any(shape.fullmatch(text) for shape in _SHAPES)
 
 
