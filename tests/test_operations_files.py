@@ -85,6 +85,23 @@ def test_a_launch_file_starts_what_there_is(path, monkeypatch):
     assert used == declared
 
 
+@pytest.mark.parametrize('path', LAUNCH, ids=lambda path: path.name)
+def test_a_launch_file_hands_the_tokens_to_the_page(path, monkeypatch):
+    if 'dashboard' not in path.read_text():
+        pytest.skip('it starts no page')
+    given = {'host': '0.0.0.0', 'token_file': '/etc/tokens'}
+    page = next(
+        a
+        for a in described(path, monkeypatch, **given)
+        if a.kind == 'Node' and a.executable == 'dashboard'
+    )
+    assert page.arguments == ['--host', '0.0.0.0', '--token-file', '/etc/tokens']
+    page = next(
+        a for a in described(path, monkeypatch) if a.kind == 'Node' and a.executable == 'dashboard'
+    )
+    assert page.arguments == ['--host', '127.0.0.1']
+
+
 @pytest.mark.parametrize('processes', [0, 2])
 def test_the_fleet_launch_file_and_the_run_command_start_the_same(processes, monkeypatch):
     valves = read_fleet(SHARE / 'config' / 'fleet.yaml')

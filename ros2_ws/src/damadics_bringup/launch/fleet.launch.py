@@ -74,6 +74,22 @@ def valves(context):
     return actions
 
 
+def page(context):
+    """Describe the page, with the tokens that other machines must show."""
+    words = ['--host', LaunchConfiguration('host').perform(context)]
+    tokens = LaunchConfiguration('token_file').perform(context)
+    return [
+        Node(
+            package='damadics_dashboard',
+            executable='dashboard',
+            arguments=words + (['--token-file', tokens] if tokens else []),
+            output='screen',
+            ros_arguments=['--enclave', '/dashboard'],
+            condition=IfCondition(LaunchConfiguration('dashboard')),
+        )
+    ]
+
+
 def generate_launch_description():
     """Describe what is started."""
     return LaunchDescription(
@@ -96,6 +112,15 @@ def generate_launch_description():
                 'dashboard', default_value='false', description='start the page'
             ),
             DeclareLaunchArgument(
+                'host', default_value='127.0.0.1', description='address of the page'
+            ),
+            DeclareLaunchArgument(
+                'token_file',
+                default_value='',
+                description='file with the tokens of those who may open the page; another host '
+                'needs one',
+            ),
+            DeclareLaunchArgument(
                 'record', default_value='false', description='record all topics'
             ),
             DeclareLaunchArgument(
@@ -110,12 +135,6 @@ def generate_launch_description():
                 ros_arguments=['--enclave', '/recorder'],
                 condition=IfCondition(LaunchConfiguration('record')),
             ),
-            Node(
-                package='damadics_dashboard',
-                executable='dashboard',
-                output='screen',
-                ros_arguments=['--enclave', '/dashboard'],
-                condition=IfCondition(LaunchConfiguration('dashboard')),
-            ),
+            OpaqueFunction(function=page),
         ]
     )

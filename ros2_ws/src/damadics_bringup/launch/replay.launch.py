@@ -3,10 +3,25 @@
 """Play a recorded bag through the live nodes: its measurement, under its own time."""
 
 from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument
+from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.conditions import IfCondition
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
+
+
+def page(context):
+    """Describe the page, with the tokens that other machines must show."""
+    words = ['--host', LaunchConfiguration('host').perform(context)]
+    tokens = LaunchConfiguration('token_file').perform(context)
+    return [
+        Node(
+            package='damadics_dashboard',
+            executable='dashboard',
+            arguments=words + (['--token-file', tokens] if tokens else []),
+            output='screen',
+            condition=IfCondition(LaunchConfiguration('dashboard')),
+        )
+    ]
 
 
 def generate_launch_description():
@@ -19,6 +34,15 @@ def generate_launch_description():
                 'mode', default_value='monitor', description='mode of detection'
             ),
             DeclareLaunchArgument('rate', default_value='1.0', description='speed of the replay'),
+            DeclareLaunchArgument(
+                'host', default_value='127.0.0.1', description='address of the page'
+            ),
+            DeclareLaunchArgument(
+                'token_file',
+                default_value='',
+                description='file with the tokens of those who may open the page; another host '
+                'needs one',
+            ),
             DeclareLaunchArgument(
                 'dashboard', default_value='true', description='start the web page'
             ),
@@ -34,12 +58,7 @@ def generate_launch_description():
                 parameters=[{**parameters, 'alarm_folder': ''}],
                 output='screen',
             ),
-            Node(
-                package='damadics_dashboard',
-                executable='dashboard',
-                output='screen',
-                condition=IfCondition(LaunchConfiguration('dashboard')),
-            ),
+            OpaqueFunction(function=page),
             Node(
                 package='damadics_fd',
                 executable='replay',

@@ -6,12 +6,27 @@ from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
 from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument
+from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.conditions import IfCondition
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
 CONFIG = Path(get_package_share_directory('damadics_bringup'), 'config')
+
+
+def page(context):
+    """Describe the page, with the tokens that other machines must show."""
+    words = ['--host', LaunchConfiguration('host').perform(context)]
+    tokens = LaunchConfiguration('token_file').perform(context)
+    return [
+        Node(
+            package='damadics_dashboard',
+            executable='dashboard',
+            arguments=words + (['--token-file', tokens] if tokens else []),
+            output='screen',
+            condition=IfCondition(LaunchConfiguration('dashboard')),
+        )
+    ]
 
 
 def generate_launch_description():
@@ -38,6 +53,15 @@ def generate_launch_description():
             ),
             DeclareLaunchArgument(
                 'dashboard', default_value='false', description='start the page'
+            ),
+            DeclareLaunchArgument(
+                'host', default_value='127.0.0.1', description='address of the page'
+            ),
+            DeclareLaunchArgument(
+                'token_file',
+                default_value='',
+                description='file with the tokens of those who may open the page; another host '
+                'needs one',
             ),
             DeclareLaunchArgument(
                 'record', default_value='false', description='record all topics'
@@ -87,11 +111,6 @@ def generate_launch_description():
                 output='screen',
                 condition=IfCondition(LaunchConfiguration('simulate')),
             ),
-            Node(
-                package='damadics_dashboard',
-                executable='dashboard',
-                output='screen',
-                condition=IfCondition(LaunchConfiguration('dashboard')),
-            ),
+            OpaqueFunction(function=page),
         ]
     )

@@ -210,7 +210,7 @@ class DetectorNode(MonitoringNode):
             message.text = plain(message.text + more, SENTENCE)
             self._fault_event.publish(message)
             own = bool(self._core.signature.state[0].own)
-            isolation = isolation_message(explained, frame_id, self.settings.mode, own)
+            isolation = isolation_message(explained, frame_id, own)
             if isolation and self.settings.mode != 'scada':  # there the estimator knows more
                 self._isolation.publish(isolation)
         self._memory.keep()

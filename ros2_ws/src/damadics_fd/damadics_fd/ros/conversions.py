@@ -25,7 +25,6 @@ EVENT_FIELDS = tuple(  # that event and message have in common, but for the stam
     for name in FaultEvent.get_fields_and_field_types()
     if name in Event.__dataclass_fields__ and name != 'onset'
 )
-FOUND_BY_TEST = 'control-room test'
 FOUND_BY = ('threshold', 'signature')
 
 
@@ -122,13 +121,12 @@ def event_message(event: Event, frame_id: str) -> FaultEvent:
     return message
 
 
-def isolation_message(event: Event, frame_id: str, mode: str, own: bool) -> Isolation | None:
+def isolation_message(event: Event, frame_id: str, own: bool) -> Isolation | None:
     """
-    Return what a fault is taken for.
+    Return what the detector takes a fault for.
 
     :param event: a transition of the alarm.
     :param frame_id: tag of the actuator.
-    :param mode: of the monitor.
     :param own: the signature raised the alarm, not the threshold.
     :return: the message; None where the transition tells nothing of the cause.
     """
@@ -136,8 +134,8 @@ def isolation_message(event: Event, frame_id: str, mode: str, own: bool) -> Isol
         return None
     message = Isolation(
         occurrence=event.occurrence,
-        test='' if mode == 'scada' else 'velocity',
-        found_by=FOUND_BY_TEST if mode == 'scada' else FOUND_BY[own],
+        test='velocity',
+        found_by=FOUND_BY[own],
         candidate=[event.cause] if event.cause else [],
         confidence=[event.confidence] if event.cause else [],
         strength=event.strength,

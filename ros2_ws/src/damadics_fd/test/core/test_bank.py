@@ -12,6 +12,7 @@ from damadics_fd.core.decision.events import Decision
 from damadics_fd.core.monitor import monitor_for
 from damadics_fd.core.quality import Reason
 from damadics_fd.core.sample import COLUMNS, SIGNALS
+from damadics_fd.core.scada.naming.looks import Looks
 from damadics_fd.core.settings import Settings
 from damadics_plant import simulate
 
@@ -124,6 +125,12 @@ def test_interleaved_valves_get_the_bits_of_their_own_monitors(case):
             due |= np.diff(judged[name], prepend=np.zeros(1, judged[name].dtype)) != 0
         shown = [Decision(*row.item()) for row in judged[due]]
         assert [str(decision) for decision in news[v]] == [str(decision) for decision in shown]
+        told = bank.judgement(v)
+        assert told is bank.judgement(v)
+        if bank.mode == 'scada':
+            assert str(told) == str(Looks().judge(result.estimator.monitor))
+        else:
+            assert told is None
     assert any(result.detections for result in results), 'no fault is in this test'
 
 

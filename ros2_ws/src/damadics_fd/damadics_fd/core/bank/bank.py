@@ -22,6 +22,7 @@ from damadics_fd.core.bank.approximators import Approximators
 from damadics_fd.core.bank.control_rooms import ControlRooms
 from damadics_fd.core.bank.rows import Reasons
 from damadics_fd.core.decision.detector import Detector
+from damadics_fd.core.judgement import Judgement
 from damadics_fd.core.quality import Refused
 from damadics_fd.core.record import Array, Floats, Ints, Plain, Saved
 from damadics_fd.core.sample import SIGNALS
@@ -159,6 +160,15 @@ class Bank:
         :return: the last refusal; None where all is well.
         """
         return self._held.estimator(self._index(valve)).failing
+
+    def judgement(self, valve: int) -> Judgement | None:
+        """
+        Say what the fault of a valve is taken for, in a mode that judges it by itself.
+
+        :param valve: its number.
+        :return: the same object as before where nothing has changed; None before any alarm.
+        """
+        return self._held.judgement(self._index(valve))
 
     def counters(self, valve: int) -> dict[str, int]:
         """

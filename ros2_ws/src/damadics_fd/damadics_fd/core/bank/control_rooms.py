@@ -10,11 +10,13 @@ import numpy as np
 from damadics_fd.core.bank.held import Held
 from damadics_fd.core.bank.rows import LATER, Reasons, decide, note, take_control_room
 from damadics_fd.core.decision.events import Decision
+from damadics_fd.core.judgement import Judgement
 from damadics_fd.core.modes import PHASE_INIT
 from damadics_fd.core.quality import ACCEPTED
 from damadics_fd.core.record import Array, Floats, Ints, stacked
 from damadics_fd.core.scada.estimator import BLANK, ScadaEstimator
 from damadics_fd.core.scada.kernel import Shown
+from damadics_fd.core.scada.naming.looks import Looks
 from damadics_fd.core.scada.state import MONITOR, REFERENCE
 from damadics_fd.core.settings import Settings
 
@@ -29,6 +31,7 @@ class ControlRooms(Held):
 
     def __init__(self, settings: Sequence[Settings], classes: Sequence[int]) -> None:
         super().__init__(settings, classes)
+        self._looks: dict[int, Looks] = {}  # of valves that had an alarm
         count = len(settings)
         self.monitor_records = stacked(ScadaEstimator(one).monitor.record for one in self.settings)
         self.shown = Shown.rows(count)
@@ -121,6 +124,17 @@ class ControlRooms(Held):
         estimator = self._lend(v)
         estimator.refused = self.last_refused(v)
         return estimator
+
+    def judgement(self, v: int) -> Judgement | None:
+        """
+        Say what the fault of a valve is taken for; looked at now and then.
+
+        :param v: which.
+        :return: the same object as before where nothing has changed; None before any alarm.
+        """
+        estimator = self._lend(v)
+        estimator.looks = self._looks.setdefault(v, Looks())
+        return estimator.judgement
 
     @contextmanager
     def opened(self, v: int) -> Iterator[ScadaEstimator]:

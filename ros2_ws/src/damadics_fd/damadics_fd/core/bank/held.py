@@ -12,6 +12,7 @@ from damadics_fd.core.bank.rows import LastRefused
 from damadics_fd.core.decision.detector import Detector
 from damadics_fd.core.decision.events import Decision
 from damadics_fd.core.intake import Intake
+from damadics_fd.core.judgement import Judgement
 from damadics_fd.core.quality import ACCEPTED, Quality, Refused
 from damadics_fd.core.record import Array, stacked
 from damadics_fd.core.settings import Settings
@@ -63,6 +64,15 @@ class Held:
         return Detector(self.of(v), self.classes).hold(
             self.detectors[part], self.signatures[part], self.estimates[part], self.decisions[part]
         )
+
+    def judgement(self, v: int) -> Judgement | None:
+        """
+        Say what the fault of a valve is taken for, where the estimator judges that.
+
+        :param v: which.
+        :return: None where it does not, or there was no alarm.
+        """
+        return None
 
     def last_refused(self, v: int) -> Refused | None:
         """

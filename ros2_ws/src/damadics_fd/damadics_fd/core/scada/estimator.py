@@ -65,7 +65,7 @@ class ScadaEstimator(Intake):
     def __init__(self, settings: Settings) -> None:
         self.monitor = ScadaMonitor(scada_settings(settings))
         super().__init__(settings)
-        self._looks = Looks()
+        self.looks = Looks()
         self.shown = Shown.rows()
         self._estimate = Estimate.rows()
         self.reset()
@@ -207,7 +207,7 @@ class ScadaEstimator(Intake):
 
         :return: the judgement, None before any alarm.
         """
-        return self._looks.judge(self.monitor)
+        return self.looks.judge(self.monitor)
 
     @property
     def status(self) -> str:

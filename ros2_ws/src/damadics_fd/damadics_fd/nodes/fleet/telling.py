@@ -6,13 +6,14 @@ import time
 from collections.abc import Callable
 
 import numpy as np
-from damadics_msgs.msg import FaultFlag, FleetEvent, FleetIsolation
+from damadics_msgs.msg import FaultFlag, FleetEvent, FleetIsolation, Isolation
 from numpy.typing import NDArray
 from rclpy.node import Node
 
 from damadics_fd.causes import CauseTable, explain
 from damadics_fd.core.approximator.state import Estimate
 from damadics_fd.core.decision.events import Decision
+from damadics_fd.core.judgement import Judgement
 from damadics_fd.core.record import Floats
 from damadics_fd.core.text import SENTENCE, plain
 from damadics_fd.nodes.fleet.ages import Ages
@@ -21,7 +22,12 @@ from damadics_fd.nodes.fleet.exposed import Exposed
 from damadics_fd.nodes.fleet.keeping import Keeping
 from damadics_fd.nodes.fleet.members import Happening, Members, Taken
 from damadics_fd.ros import qos
-from damadics_fd.ros.conversions import event_message, isolation_message, write_flag
+from damadics_fd.ros.conversions import (
+    event_message,
+    isolation_message,
+    judgement_message,
+    write_flag,
+)
 from damadics_fd.ros.entities import Entities
 
 
@@ -56,6 +62,7 @@ class Telling:
         self._isolation = entities.publisher(FleetIsolation, 'fleet/isolation', qos.EVENTS)
         self._exposed: dict[int, Exposed] = {}
         self._watched: list[int] = []
+        self._judgements: dict[int, Judgement] = {}  # the latest of mode scada, by valve
 
     def expose(self, count: int, take: Callable[[int, bytes], None]) -> None:
         """
@@ -107,15 +114,11 @@ class Telling:
             message.text = plain(message.text + remark, SENTENCE)
             self._event.publish(FleetEvent(valve=place, event=message))
             signature = self._keeping.detector(number).signature.state[0]
-            isolation = isolation_message(
-                explained, tag, member.settings.mode, bool(signature.own)
-            )
-            if isolation:
-                self._isolation.publish(FleetIsolation(valve=place, isolation=isolation))
+            isolation = isolation_message(explained, tag, bool(signature.own))
+            if isolation and member.settings.mode != 'scada':
+                self._tell_cause(number, isolation)
             if number in self._exposed:
                 self._exposed[number].event.publish(message)
-                if isolation:
-                    self._exposed[number].isolation.publish(isolation)
         for number in {number for number, _ in happened}:
             self._keeping.keep(number)
             self.flag(number)
@@ -136,8 +139,28 @@ class Telling:
         :param ages: of all valves.
         """
         self._watched = [n for n, one in self._exposed.items() if one.watched]
+        self._look_at_faults()
         for number in self._exposed:
             self._flag(number, ages[number])
+
+    def _look_at_faults(self) -> None:
+        """Tell what faults are taken for in mode scada, where that has changed."""
+        for bank, numbers in zip(self._members.banks, self._members.numbers, strict=True):
+            if bank.mode != 'scada':
+                continue
+            for place in np.flatnonzero(bank.decisions['fault']).tolist():
+                number = int(numbers[place])
+                judgement = bank.judgement(place)
+                if judgement is not None and judgement is not self._judgements.get(number):
+                    self._judgements[number] = judgement
+                    tag = self._members.all[number].actuator
+                    self._tell_cause(number, judgement_message(judgement, tag))
+
+    def _tell_cause(self, number: int, isolation: Isolation) -> None:
+        place = self._members.all[number].namespace
+        self._isolation.publish(FleetIsolation(valve=place, isolation=isolation))
+        if number in self._exposed:
+            self._exposed[number].isolation.publish(isolation)
 
     def ages(self) -> Floats:
         """
