@@ -118,7 +118,7 @@ class Held:
         :param v: which.
         :return: a digest of their layout, then the records.
         """
-        return self._mark() + b''.join(array[v].tobytes() for array in self.state_arrays())
+        return self._mark() + b''.join(array[v : v + 1].tobytes() for array in self.state_arrays())
 
     def restore_bytes(self, v: int, state: bytes) -> None:
         """
