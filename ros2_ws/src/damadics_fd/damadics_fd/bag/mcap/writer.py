@@ -233,14 +233,17 @@ class McapWriter:
             struct.pack('<Q', len(packed)),
             packed,
         )
-        places, indexes = {}, b''
+        places: dict[int, int] = {}
+        indexes: list[bytes] = []
+        index_at = at + len(chunk)
         for channel, entries in self._index.items() if self._message_index else ():
-            places[channel] = at + len(chunk) + len(indexes)
+            places[channel] = index_at
             pairs = string(b''.join(entries))
-            indexes += record(Op.MESSAGE_INDEX, struct.pack('<H', channel), pairs)
-        self._write(chunk + indexes)
-        sizes = len(packed), len(content)
-        self._ending.note_chunk(times, (at, len(chunk)), sizes, places, len(indexes))
+            indexes.append(record(Op.MESSAGE_INDEX, struct.pack('<H', channel), pairs))
+            index_at += len(indexes[-1])
+        self._write(chunk + b''.join(indexes))
+        sizes, index_size = (len(packed), len(content)), index_at - at - len(chunk)
+        self._ending.note_chunk(times, (at, len(chunk)), sizes, places, index_size)
         self._reset_chunk()
 
     def flush(self) -> None:
