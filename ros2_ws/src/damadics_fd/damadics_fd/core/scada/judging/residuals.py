@@ -28,6 +28,7 @@ FLOW_DRIFT = 0.1  # of log F
 CALM = 0.5  # of a limit: nothing speaks of a fault
 END = 0.985  # of the meter's range: it shows no more
 AT_END, LEAST_END = 4.0, 0.9  # deviations of its noise below that, but not below this share
+SEAT = 0.03  # of the stroke, so near to its seat a plug throttles as it likes
 LEAST = 0.03  # of the meter's range: it shows no less
 AGAIN = 2  # times that the largest flow of all was shown: the end of its range
 FOLLOW_S = 600.0  # a process pressure is followed this slowly
@@ -149,7 +150,7 @@ def flow_residual(s: MonitorState, ref: Reference, x: float, flow: float) -> flo
         top = min(top, s.top_flow) if top > 0.0 else s.top_flow
     near = max(min(END * top, top - AT_END * law.noise), LEAST_END * top)
     ended = top > 0.0 and flow >= near
-    if ended:
+    if ended or max(x, s.xm[0]) > 1.0 - SEAT:
         low = -math.inf  # the flow may be anything above what is shown
     elif flow < LEAST * scale:
         low = min(low, LEAST * scale)  # and here anything below
