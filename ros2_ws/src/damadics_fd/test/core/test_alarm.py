@@ -21,8 +21,6 @@ from damadics_fd.core.modes import PHASE_HOLD, PHASE_LEARN_PHI
 
 from .residuals import TICK, Valve
 
-pytestmark = pytest.mark.plain
-
 
 def test_a_single_spike_is_a_near_miss():  # IN-3, AM-2
     valve = Valve()
