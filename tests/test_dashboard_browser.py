@@ -234,7 +234,7 @@ def test_everything_can_be_reached_with_the_keyboard(system, page):
 @pytest.mark.skipif(not BAG.is_file(), reason='the golden bags are not there: make bags')
 def test_replay_of_a_golden_bag_shows_its_fault(system, page):
     page.goto(f'{system.site.address}/replay')
-    page.set_input_files('input[type=file]', str(BAG))
+    page.set_input_files('.drop input[type=file]', str(BAG))
     page.wait_for_selector('.banner >> text=the first at', timeout=120_000)
     assert 'fault f4 was simulated from 70.00 s, flagged' in page.locator('.banner').inner_text()
     page.wait_for_timeout(1500)
@@ -245,5 +245,5 @@ def test_replay_of_a_broken_file_says_why(system, page, tmp_path):
     broken = tmp_path / 'broken.mcap'
     broken.write_bytes(b'\x89MCAP0\r\n' + bytes(50))
     page.goto(f'{system.site.address}/replay')
-    page.set_input_files('input[type=file]', str(broken))
+    page.set_input_files('.drop input[type=file]', str(broken))
     page.wait_for_selector('[role=alert] >> text=cannot be replayed')

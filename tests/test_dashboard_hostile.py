@@ -111,12 +111,12 @@ def test_the_name_of_a_dropped_file_is_data(hostile, browser, tmp_path):
     page.goto(f'{hostile.address}/replay')
     name = '..\\<img src=x onerror=window.pwn=1>".mcap'
     page.set_input_files(
-        'input[type=file]',
+        '.drop input[type=file]',
         files=[{'name': name, 'mimeType': 'x/y', 'buffer': b'\x89MCAP0\r\n' + bytes(99)}],
     )
     page.wait_for_selector('[role=alert] >> text=cannot be replayed', timeout=60_000)
     unharmed(page)
-    assert page.locator('input[type=file]').is_enabled()
+    assert page.locator('.drop input[type=file]').is_enabled()
     page.close()
 
 

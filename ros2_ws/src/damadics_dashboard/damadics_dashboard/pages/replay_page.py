@@ -45,8 +45,8 @@ def replay_page(watcher: Watcher) -> None:
             with_values(mode, role='group', aria_label=t('mode'))
         explained = ui.label(t(f'mode_{MODES[0]}')).classes('sub')
         mode.on_value_change(lambda: explained.set_text(t(f'mode_{mode.value}')))
-        chosen = _SettingsOfValve(mode, t)
         drop = box('div', 'drop w-full')
+        chosen = _SettingsOfValve(mode, t)
         results = box('div', 'stack w-full')
 
         async def take(event: events.UploadEventArguments) -> None:

@@ -41,8 +41,8 @@ class AlarmMachine(RuleBasedStateMachine):
                 assert not self.active_before
                 self.raised += 1
                 self.active_before = True
-            elif event.transition == CHANGED and not self.active_before:
-                self.resumed += 1
+            elif event.transition == CHANGED and self.valve.detector.state['active'][0]:
+                self.resumed += not self.active_before
                 self.active_before = True
             elif event.transition == CLEARED:
                 assert self.active_before

@@ -50,7 +50,8 @@ def load_scenario(name: str) -> Scenario:
     path, extension, entry = name.partition('.yaml')
     if not extension:
         near = get_close_matches(name, scenario_names(), 1)
-        hint = f'do you mean {near[0]}?' if near else 'see --list, or give FILE.yaml:NAME'
+        hint = f'do you mean {near[0]}? ' if near else ''
+        hint += 'See --list, or give FILE.yaml:NAME'
         raise ScenarioError(f'scenario: there is no {name!r}; {hint}')
     scenarios = read_scenarios(Path(path + '.yaml'))
     entry = entry.lstrip(':')

@@ -123,7 +123,8 @@ class ScadaMonitor:
         rows, rest = divmod(len(seen) - size - 8, 7 * 8)
         if rows < 0 or rest:
             raise ValueError('what was seen of the valve is damaged: learn it anew')
-        self._state = np.frombuffer(seen, MONITOR, 1).copy()
+        self._state = np.zeros(1, MONITOR)  # a copy of the record would leave its padding out
+        self._state.view(np.uint8)[:] = np.frombuffer(seen, np.uint8, size)
         self._learn_until = float(np.frombuffer(seen, np.float64, 1, size)[0])
         self._buffer = np.frombuffer(seen, np.float64, 7 * rows, size + 8).reshape(rows, 7).copy()
         self._filled = rows
