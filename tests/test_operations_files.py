@@ -281,6 +281,12 @@ def test_the_policy_lets_nobody_but_the_detector_raise_a_flag(secured):
         assert {n for n, names in rights(secured, verb).items() if name in names} == owners
 
 
+def test_the_policy_lets_the_page_hear_what_it_shows(secured):
+    shown = {'measurement', 'estimate', 'threshold', 'fault_flag', 'fault_event'}
+    shown |= {'signature', 'isolation', 'operator_action'}
+    assert {f'/lv101/{name}' for name in shown} <= rights(secured, 'subscribe')['/dashboard']
+
+
 def test_the_policy_has_what_ros2_security_reads(secured):
     """Version, elements and attributes as in the schema of sros2, and that itself where it is."""
     root = ET.parse(secured).getroot()

@@ -36,6 +36,7 @@ LIFECYCLE = (
     'get_transition_graph',
 )
 SAMPLES = ('measurement', 'estimate', 'threshold', 'fault_flag', 'fault_event')
+SHOWN = (*SAMPLES, 'signature', 'isolation', 'operator_action')  # by the page
 ALL = (*SAMPLES, 'residual', 'signature', 'fault_state', 'operator_action', 'isolation')
 OPERATE = (
     'acknowledge',
@@ -60,7 +61,7 @@ class Rights:
 
 NODES = {  # of every valve
     'estimator': Rights(
-        ('estimate', 'operator_action', '/diagnostics', '~/transition_event'),
+        ('estimate', 'isolation', 'operator_action', '/diagnostics', '~/transition_event'),
         ('measurement',),
         ('relearn', 'save_reference', 'load_reference', *(f'~/{name}' for name in LIFECYCLE)),
     ),
@@ -71,6 +72,7 @@ NODES = {  # of every valve
             'fault_flag',
             'fault_event',
             'signature',
+            'isolation',
             'operator_action',
             'stroke_request',
             '/diagnostics',
@@ -111,7 +113,7 @@ def policy(
             shared = process_of.get(valve.name, '') if node in MONITORS else ''
             _enclave(enclaves, f'/{valve.name}', node, _of_valve(rights, valve), shared)
     operate = (*OPERATE, 'inject_fault') if simulate else OPERATE
-    page = _all(valves, Rights((), SAMPLES, (), operate))
+    page = _all(valves, Rights((), SHOWN, (), operate))
     _enclave(
         enclaves, '/', 'dashboard', Rights((), (*page.subscribe, '/diagnostics'), (), page.request)
     )
