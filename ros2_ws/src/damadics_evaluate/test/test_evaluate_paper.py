@@ -17,7 +17,7 @@ def test_cells_split_alarms_at_the_fault():
         'paper_friction': np.array([3.0, 30.8, 81.12, 90.0]),
         'paper_spring': np.array([]),
     }
-    assert Row('x', alarms).cells() == ['x', '81.120', 'not detected', '2 / 0', '1']
+    assert Row('x', alarms).cells() == ['x', '81.1200', 'not detected', '2 / 0', '1']
 
 
 def test_limits_keep_the_fault_free_runs_quiet():

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from damadics_fd.core.monitor import run
+from damadics_fd.core.monitor import Chain, run
 from damadics_fd.core.result import Result
 from damadics_fd.core.scada.settings import ScadaSettings
 from damadics_fd.core.settings import Settings
@@ -35,6 +35,7 @@ LEARN_UNTIL = 60.0
 SETTLED = 5.0
 CALIBRATION = 3  # fault-free runs of the paper's profile that set the limits of the baselines
 MARGIN = 1.1
+PASSES = 2  # of the fault-free experiment that paper mode learns from
 REPEATS = 8  # of the paper's CV profile, for the hour the SCADA-rate monitor learns from
 WIDTH, COLOURS = 900, 16  # of the figures in the report
 REFUSED = 'refused'
@@ -46,10 +47,10 @@ COLUMNS = (
 )
 TEXT = (
     'CV profile of Figs. 5(f) and 6(f), faults at 70 s. Paper mode at 400 Hz without noise, as '
-    'published: 81.12 and 70.005 s. All others with benchmark noise at 200 Hz; the SCADA-rate '
-    'monitor sees 1 Hz. The limits of the baselines are 1.1 times their largest value in three '
-    'fault-free runs of the same profile. Monitor mode and the EKF with states get the chamber '
-    'pressure.'
+    'published: 81.12 and 70.005 s, learned before under nominal conditions. All others with '
+    'benchmark noise at 200 Hz; the SCADA-rate monitor sees 1 Hz. The limits of the baselines are '
+    '1.1 times their largest value in three fault-free runs of the same profile. Monitor mode and '
+    'the EKF with states get the chamber pressure.'
 )
 Recorded = Mapping[str, np.ndarray]  # the columns of one run
 Alarms = NDArray[np.float64]  # instants of rising edges, s
@@ -76,7 +77,7 @@ class Row:
         for name in RUNS[1:]:
             at = self.alarms[name]
             late = at[at >= FAULT_AT - 1e-9]
-            first.append(f'{late[0]:.3f}' if len(late) else 'not detected')
+            first.append(f'{late[0]:.4f}' if len(late) else 'not detected')
             before.append(str(int((at < FAULT_AT - 1e-9).sum())))
         return [self.title, *first, ' / '.join(before), str(len(self.alarms[RUNS[0]]))]
 
@@ -93,8 +94,10 @@ def write_paper(directory: Path, detectors: Sequence[str]) -> Path:
 
     rows, figures = [], []
     clean = {name: simulate(name, rate=400.0) for name in RUNS}
-    results = {name: run(clean[name], Settings.for_mode('paper')) for name in RUNS}
+    results = _learned_before(clean)
+    zero = {name: _edges(run(clean[name], Settings.for_mode('paper'))) for name in RUNS}
     rows.append(Row('paper mode', {name: _edges(r) for name, r in results.items()}))
+    rows.append(Row('paper mode, from zero weights', zero))
     figures = [_figure(results[name], clean[name], name) for name in RUNS[1:]]
     noisy = {name: simulate(name, rate=RATE, noise=True, seed=0) for name in RUNS}
     quiet = [simulate(RUNS[0], rate=RATE, noise=True, seed=1 + i) for i in range(CALIBRATION)]
@@ -115,6 +118,17 @@ def write_paper(directory: Path, detectors: Sequence[str]) -> Path:
     directory.mkdir(parents=True, exist_ok=True)
     file.write_text(json.dumps(content), encoding='utf-8')
     return file
+
+
+def _learned_before(clean: Mapping[str, Recorded]) -> dict[str, Result]:
+    """Run paper mode from what it has learned in passes of the fault-free run."""
+    learned = None
+    for _ in range(PASSES):
+        chain = Chain(Settings.for_mode('paper')).starting_from(learned)
+        chain.run(clean[RUNS[0]])
+        learned = chain.learned()
+    start = Settings.for_mode('paper')
+    return {name: Chain(start).starting_from(learned).run(clean[name]) for name in RUNS}
 
 
 def _edges(result: Result) -> Alarms:
