@@ -4,6 +4,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -114,6 +115,8 @@ class _Copy:
         self._declared: set[int] = set()
         self._schemas: set[int] = set()
         self._nameless = 0
+        self._waiting: list[Channel] = []  # for their schema
+        self._channels_seen = self._schemas_seen = 0
 
     def run(self) -> BagFile:
         """Copy everything; return what was written."""
@@ -122,11 +125,9 @@ class _Copy:
             self._writer = McapWriter(stream, self._file.profile)
             for batch in self._file.batches():
                 used = {number for number, _ in batch.by_channel()}
-                known = list(self._file.channels.values())
-                # a schema comes before its messages, not always before its channel
-                self._declare([c for c in known if c.id in used or self._complete(c)])
+                self._declare(self._ready(used))
                 self._declare(self._lost(used))
-                self._write(batch, written)
+                self._write(batch, used, written)
             self._declare(list(self._file.channels.values()))
             described = isinstance(self._file, McapFile) and self._extras(self._file)
             if not described and self._file.profile == 'ros2':
@@ -161,6 +162,20 @@ class _Copy:
             )
             self._topics.setdefault(channel.topic, _topic(channel, schema))
 
+    def _ready(self, used: set[int]) -> list[Channel]:
+        """Return channels that can be written: those in use, and those whose schema is known."""
+        channels, schemas = self._file.channels, self._file.schemas
+        new = list(islice(reversed(channels.values()), len(channels) - self._channels_seen))
+        self._channels_seen = len(channels)
+        late = new[::-1]
+        if len(schemas) != self._schemas_seen:
+            # a schema comes before its messages, not always before its channel
+            late, self._waiting = self._waiting + late, []
+            self._schemas_seen = len(schemas)
+        ready = [channel for channel in late if self._complete(channel)]
+        self._waiting += [channel for channel in late if not self._complete(channel)]
+        return ready + [channels[number] for number in sorted(used) if number in channels]
+
     def _complete(self, channel: Channel) -> bool:
         return not channel.schema_id or channel.schema_id in self._file.schemas
 
@@ -170,8 +185,8 @@ class _Copy:
         self._nameless += len(found)
         return [Channel(number, 0, f'/lost_channel_{number}', '', {}) for number in found]
 
-    def _write(self, batch: Batch, written: BagFile) -> None:
-        rows = np.flatnonzero(np.isin(batch.channels, list(self._declared)))
+    def _write(self, batch: Batch, used: set[int], written: BagFile) -> None:
+        rows = np.flatnonzero(np.isin(batch.channels, list(used & self._declared)))
         for first in range(0, len(rows), ROWS):
             self._write_rows(batch, rows[first : first + ROWS], written)
 

@@ -10,6 +10,7 @@ import pytest
 import zstandard
 from damadics_fd.bag import BagError
 from damadics_fd.bag.checking.inspection import LOSSY, UNUSABLE, WHOLE, inspect
+from damadics_fd.bag.mcap.reader import McapFile
 from damadics_fd.bag.mcap.records import CHUNK, MAGIC, Op, record, string
 from damadics_fd.bag.mcap.writer import McapWriter
 from damadics_fd.bag.recording import Recording, find_recordings
@@ -175,6 +176,22 @@ def test_files_for_a_topic_with_a_nul_stay_in_their_folder(tmp_path):
 def test_many_channels(count, messages, tmp_path):
     (tmp_path / 'a.mcap').write_bytes(channels(count, messages))
     commands(tmp_path / 'a.mcap', tmp_path)
+
+
+def test_a_message_between_declarations_costs_no_look_at_the_whole_file(tmp_path, monkeypatch):
+    count, read = 2000, []
+    file = tmp_path / 'a.mcap'
+    file.write_bytes(channels(count, messages=True))
+    original = McapFile.read_bytes
+
+    def counted(self, at, size):
+        data = original(self, at, size)
+        read.append(len(data))
+        return data
+
+    monkeypatch.setattr(McapFile, 'read_bytes', counted)
+    assert salvage(file, tmp_path / 'saved.mcap').saved.messages == count
+    assert sum(read) / count < 50_000  # was a megabyte, or all that follows
 
 
 def test_many_layouts(tmp_path):

@@ -34,6 +34,7 @@ from damadics_fd.bag.mcap.wellformed import fields_end, well_formed
 from damadics_fd.bag.messages import MessageFile
 
 LOOSE = 1 << 20  # [B] handled at a time where there are no chunks
+FIRST = 1 << 12  # [B] read for messages of which few may follow each other
 BLOCK = 1 << 24  # [B] of the file checked at a time
 
 
@@ -63,6 +64,7 @@ class McapFile(MessageFile):
         self.crc = 0  # of the data section, 0 where the file has none
         self._chunk_places: set[int] = set()
         self._unpacked = 0  # [B] of dense chunks so far
+        self._window = LOOSE  # [B] in which the next run of messages is looked for
         self._stream: BinaryIO = open_plain(self.path, limits)
         self._size = os.fstat(self._stream.fileno()).st_size
         self._bounds = self._size, limits.record
@@ -186,9 +188,16 @@ class McapFile(MessageFile):
 
     def _run(self, at: int, length: int) -> _Found:
         """Read messages outside of chunks that follow each other, the first of a given length."""
-        window = max(LOOSE, HEAD.size + length)
-        data = np.frombuffer(bytearray(self.read_bytes(at, window)), np.uint8)
-        end = kernels.messages_end(kernels.words(data), len(data))
+        while True:
+            window = max(self._window, HEAD.size + length)
+            data = np.frombuffer(bytearray(self.read_bytes(at, window)), np.uint8)
+            end = kernels.messages_end(kernels.words(data), len(data))
+            ended = end + HEAD.size <= len(data) and data[end] != Op.MESSAGE
+            if ended or window >= LOOSE or len(data) < window:
+                break
+            self._window = min(16 * self._window, LOOSE)
+        if ended:
+            self._window = max(FIRST, 1 << (2 * end).bit_length())
         return _Found(Op.MESSAGE, end - HEAD.size, chunk=data[:end])
 
     def _length(self, op: Op, at: int, stated: int, content: bytes) -> int:
