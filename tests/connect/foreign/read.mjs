@@ -16,7 +16,12 @@ const own = spaces.indexOf("urn:damadics:fd");
 const node = (name) => `ns=${own};s=lv101${name}`;
 const value = async (nodeId, attributeId = AttributeIds.Value) =>
   (await session.read({ nodeId, attributeId })).value.value;
-const browse = (await value(node(""), AttributeIds.BrowseName)).name;
+let named = null; // the server meets its valves a while after it has started
+for (let n = 0; !named && n < 100; n++) {
+  named = await value(node(""), AttributeIds.BrowseName);
+  if (!named) await new Promise((resolve) => setTimeout(resolve, 200));
+}
+const browse = named.name;
 const types = await session.browse({
   nodeId: node(""), referenceTypeId: "HasTypeDefinition", browseDirection: 0,
   includeSubtypes: true, nodeClassMask: 0, resultMask: 63,
