@@ -5,32 +5,13 @@
 import sqlite3
 
 import pytest
+from alarm_events import event
 from damadics_dashboard.store.history import History, Wanted
 from damadics_fd.store.access import Access, Grant, Role
 from damadics_msgs.msg import FaultEvent
 
 TOKEN = '0123456789abcdef'
 OPERATOR = Access([Grant(Role.OPERATOR, TOKEN)])
-
-
-def event(transition: int, text: str = 'raised', occurrence: int = 1, stamp: int = 5) -> dict:
-    return {
-        'valve': 'lv101',
-        'stamp': stamp,
-        'transition': transition,
-        'occurrence': occurrence,
-        'level': 4,
-        'onset': 4,
-        'residual': 0.4,
-        'threshold': 0.2,
-        'ratio': 2.0,
-        'duration': 1.0,
-        'cause': 'friction',
-        'confidence': None,
-        'strength': 0.5,
-        'text': text,
-        'advice': 'look',
-    }
 
 
 def test_history_survives_and_takes_a_repeated_event_once(tmp_path):

@@ -6,6 +6,7 @@ import re
 
 import numpy as np
 import pytest
+from alarm_events import event
 from damadics_dashboard.live.fleet import FleetReport, shared
 from damadics_dashboard.live.raw import Batch
 from damadics_dashboard.live.record import ACTIONS
@@ -116,26 +117,6 @@ def test_every_state_has_its_class(state, level, kind):
     valve.take_flag(flag(state, level, 1), 100.0)
     valve.threshold_at = 100.0
     assert valve.condition(100.1, 0).kind == kind
-
-
-def event(transition: int, text: str = 'raised', occurrence: int = 1, stamp: int = 5) -> dict:
-    return {
-        'valve': 'lv101',
-        'stamp': stamp,
-        'transition': transition,
-        'occurrence': occurrence,
-        'level': 4,
-        'onset': 4,
-        'residual': 0.4,
-        'threshold': 0.2,
-        'ratio': 2.0,
-        'duration': 1.0,
-        'cause': 'friction',
-        'confidence': None,
-        'strength': 0.5,
-        'text': text,
-        'advice': 'look',
-    }
 
 
 def test_an_old_judgement_is_not_shown_as_health():

@@ -72,3 +72,15 @@ def test_no_file_names_a_place_of_one_machine_or_a_registry():
     if done.returncode > 1:
         pytest.skip('this is no git checkout')
     assert not done.stdout
+
+
+def test_no_file_points_at_a_sheet_that_no_reader_has():
+    words = r'sheet (section|step)s?|"""Section [0-9]'
+    places = [
+        f'{path.relative_to(ROOT)}: {line.strip()}'
+        for path in tracked('*.py')
+        if path.name != 'test_repository.py'
+        for line in path.read_text().splitlines()
+        if re.search(words, line)
+    ]
+    assert not places

@@ -94,7 +94,7 @@ def reference_posterior(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarra
 
 
 def specification(phi, w, v, r, forget, theta, J0, eps, b_r, b_p, tau=None):
-    """Section 2.5, with full normal equations and a general solver; tau: growing changes."""
+    """The evidence, with full normal equations and a general solver; tau: growing changes."""
     columns, widths = dict(COLUMNS), dict(WIDTH)
     if tau is not None:
         columns[1], widths[1] = [SIGN, V, SIGN_T], [0.2, 0.5, 0.3]

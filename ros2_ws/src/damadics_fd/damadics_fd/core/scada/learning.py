@@ -49,7 +49,7 @@ def learn(
     notes: list[str] | None = None,
 ) -> np.ndarray:
     """
-    Return the reference learned from a fault-free record (sheet section 1.3).
+    Return the reference learned from a fault-free record.
 
     :param samples: rows t (s), CV, X', P1', P2', T1', F' (0..1, NaN where not measured), from
         the start of the record on.

@@ -154,7 +154,7 @@ def predict(
     flow: float,
 ) -> None:
     """
-    Bring filter, models and regressors to the sample at t (sheet steps 1, 2, 4).
+    Bring filter, models and regressors to the sample at t.
 
     :param s: record of `MonitorState`.
     :param cfg: record of `SETTINGS`.
