@@ -9,14 +9,13 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
 import numpy as np
-import yaml
 from damadics_fd.core.decision.alarm import RAISED
 from damadics_fd.core.monitor import run
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.signature.state import CAUSES
 from damadics_plant import Fault, Scenario, simulate
 from damadics_plant.actuator.parameters import LuGreActuator
-from damadics_plant.actuator.twin import read_twin
+from damadics_plant.actuator.twin import parts_of, read_twin
 from damadics_plant.scenarios.sources import RandomSteps, Sine
 
 QUIET, AFTER = 240.0, 300.0  # s before and after the onset
@@ -67,7 +66,7 @@ def add_parser(commands: 'argparse._SubParsersAction[argparse.ArgumentParser]') 
     parser = commands.add_parser(
         'detectability', help='faults of growing size on the twin of a valve'
     )
-    parser.add_argument('valve', type=Path, help='file written by commission --twin')
+    parser.add_argument('valve', type=Path, help='file of the valve, or twin, of commission')
     parser.add_argument('--seeds', type=int, default=2, metavar='N', help='runs per fault (2)')
     parser.add_argument('--csv', type=Path, metavar='FILE', help='write all rows here')
     parser.add_argument('--plot', type=Path, metavar='FILE', help='draw the curve (PNG)')
@@ -111,19 +110,16 @@ def read_valve(path: Path) -> Valve:
     :return: the valve.
     :raises ValueError: naming what is wrong.
     """
-    actuator = read_twin(path)
-    content = yaml.safe_load(path.read_text(encoding='utf-8'))
-    operation = OPERATION | (content.get('operation') or {})
-    wrong = [
-        name
-        for name, value in operation.items()
-        if name not in OPERATION or not isinstance(value, (int, float)) or not 0.0 <= value < 1e9
-    ]
+    actuator, parts = read_twin(path), parts_of(path)
+    operation, wrong = dict(OPERATION), []
+    for name, value in parts['operation'].items():
+        if name in OPERATION and isinstance(value, (int, float)) and 0.0 <= value < 1e9:
+            operation[name] = float(value)
+        else:
+            wrong.append(name)
     if wrong:
         raise ValueError(f'{path}: wrong in its part operation: {", ".join(wrong)}')
-    return Valve(
-        actuator, Settings.for_mode('monitor', **(content.get('settings') or {})), operation
-    )
+    return Valve(actuator, Settings.for_mode('monitor', **parts['settings']), operation)
 
 
 def study(valve: Valve, seeds: int) -> Iterator[Row]:

@@ -75,7 +75,7 @@ def parser() -> argparse.ArgumentParser:
         '--valve',
         type=Path,
         metavar='FILE',
-        help='the twin of a valve, written by commission --twin, in place of --model',
+        help='the file of a valve, or its twin, written by commission, in place of --model',
     )
     p.add_argument(
         '--rate',

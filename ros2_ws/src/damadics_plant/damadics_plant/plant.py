@@ -54,7 +54,7 @@ class Plant(SpinnableNode):
             'rate', 400.0, 'samples per second of scenario time [Hz]', limits=(1.0, 1000.0)
         )
         model = declare('model', 'dablib', 'model of the actuator', allowed=MODELS)
-        valve = declare('valve', '', 'file of a twin, written by commission --twin; for model')
+        valve = declare('valve', '', 'file of a valve, written by commission; for model')
         noise = declare('noise', False, 'add the noise of the benchmark')
         seed = declare('seed', 0, 'seed of the noise and of random inputs', limits=(0, 2**31 - 1))
         self._factor = declare(

@@ -3,8 +3,12 @@
 """The twin of a valve: read from a file, refused with what is wrong in it."""
 
 import pytest
+import yaml
+from damadics_fd.commands.commission.command import main as commission
+from damadics_fd.core.settings.document import COMMISSION, ValveDocument, section
+from damadics_fd.core.settings.identified import VERDICTS
 from damadics_plant import LuGreActuator
-from damadics_plant.actuator.twin import read_twin
+from damadics_plant.actuator.twin import parts_of, read_twin
 from damadics_plant.command import main
 
 VALUES = {
@@ -48,6 +52,26 @@ def test_a_wrong_twin_is_refused_with_what_is_wrong(tmp_path, change, reason, ca
     words = ['nominal', '--valve', str(path), '--out', str(tmp_path / 'a.csv'), '--quiet']
     assert main(words) == 1
     assert reason.split(' is')[0] in capsys.readouterr().err
+
+
+def test_the_file_of_a_valve_runs_as_it_is(tmp_path, capsys):
+    good, valve = tmp_path / 'good.csv', tmp_path / 'lv101.yaml'
+    words = ['random_nominal', '--model', 'lugre', '--rate', '100', '--duration', '120']
+    assert main([*words, '--quiet', '--out', str(good)]) == 0
+    assert commission([str(good), '--actuator', 'LV-101', '--out', str(valve)]) == 0
+    content = yaml.safe_load(valve.read_text())
+    judged = section(content, COMMISSION)
+    assert judged['verdict'] in VERDICTS
+    assert any(line.startswith('verdict') for line in judged['report'])
+    assert 0.0 < judged['friction_in_an_hour'] <= judged['friction_in_a_minute'] < 1.0
+    document = ValveDocument.read(content)
+    assert (document.actuator, document.settings.sample_rate) == ('LV-101', 100.0)
+    assert read_twin(valve).stiffness == document.settings.stiffness
+    assert parts_of(valve)['settings']['stiffness'] == document.settings.stiffness
+    again = tmp_path / 'again.csv'
+    words = ['nominal', '--valve', str(valve), '--duration', '10', '--rate', '100']
+    assert main([*words, '--quiet', '--out', str(again)]) == 0
+    assert len(again.read_text().splitlines()) > 1000
 
 
 def test_a_parameter_file_is_no_twin(tmp_path):

@@ -78,6 +78,7 @@ class Reference:
     created: float = 0.0  # s since 1970
     software: str = VERSION
     comment: str = ''
+    commissioning: Saved = field(default_factory=dict)  # Identified.judgement(); {}: learned live
 
 
 def save_reference(path: Path | str, reference: Reference, now: float | None = None) -> Path:
@@ -163,10 +164,21 @@ def _reference(content: Saved) -> Reference:
         )
     except KeyError as error:
         raise ValueError(f'damaged: {error} is missing') from error
-    if len(content) != len(fields(Reference)):
-        raise ValueError('damaged: fields are missing or unknown')
+    commissioning = _mapping({'commissioning': {}} | content, 'commissioning')
+    if not content.keys() <= {one.name for one in fields(Reference)}:
+        raise ValueError('damaged: fields are unknown')
     return Reference(
-        actuator, learned, settings, signature, source, first, last, created, software, comment
+        actuator,
+        learned,
+        settings,
+        signature,
+        source,
+        first,
+        last,
+        created,
+        software,
+        comment,
+        commissioning,
     )
 
 

@@ -7,7 +7,7 @@ import pytest
 import yaml
 from damadics_fd.core.modes import MODES
 from damadics_fd.core.settings import Settings, SettingsError
-from damadics_fd.core.settings.document import ValveDocument
+from damadics_fd.core.settings.document import ValveDocument, parameters_in
 
 pytestmark = pytest.mark.plain
 
@@ -98,6 +98,10 @@ def test_the_file_of_a_valve_says_what_differs_and_comes_back():
     read = ValveDocument.read(content)
     assert (read.settings.latch, read.actuator) == (False, 'LV-101')
     assert ValveDocument.read(content, 'monitor').settings.mode == 'monitor'
+    content['/**/commission'] = {'ros__parameters': {'verdict': 'ok', 'misfit': 0.1}}
+    content['/**/plant'] = {'ros__parameters': {'twin': {'kv': 1.0}, 'kv': 1.0}}
+    assert ValveDocument.read(content) == read
+    assert {'verdict', 'twin'}.isdisjoint(parameters_in(content))
 
 
 @pytest.mark.parametrize('content', [None, [], {'/**': None}, {'/**': {'ros__parameters': []}}])

@@ -4,6 +4,7 @@
 
 import json
 import re
+from dataclasses import asdict
 from pathlib import Path
 
 import damadics_fd
@@ -15,12 +16,14 @@ from damadics_fd.core.approximator.estimator import Estimator
 from damadics_fd.core.monitor import run
 from damadics_fd.core.settings import Settings
 from damadics_fd.store.references import (
+    FORMAT,
     NoReferenceError,
     Reference,
     ReferenceFileError,
     load_reference,
     save_reference,
 )
+from damadics_fd.store.slots import write_slot
 
 from ..core.synthetic import valve
 
@@ -50,6 +53,19 @@ def test_restarted_estimator_goes_straight_to_monitor(tmp_path, learned):
     assert result.detections == []
     assert estimator.learned() == learned
     assert estimator.status == 'monitoring'
+
+
+def test_the_verdict_is_kept_and_a_reference_without_one_is_read(tmp_path, learned):
+    verdict = {'verdict': 'limited', 'reasons': ['p1 is a constant'], 'misfit': 0.2}
+    save_reference(tmp_path / 'new', reference(learned, commissioning=verdict))
+    assert load_reference(tmp_path / 'new', 'LV-101', SETTINGS).commissioning == verdict
+    old = asdict(reference(learned, created=1.0))
+    del old['commissioning']
+    write_slot(tmp_path / 'old', FORMAT, old)
+    assert load_reference(tmp_path / 'old', 'LV-101', SETTINGS).commissioning == {}
+    write_slot(tmp_path / 'odd', FORMAT, old | {'more': 1})
+    with pytest.raises(ReferenceFileError, match='fields are unknown'):
+        load_reference(tmp_path / 'odd', 'LV-101', SETTINGS)
 
 
 def test_restored_estimator_finds_the_fault(learned):

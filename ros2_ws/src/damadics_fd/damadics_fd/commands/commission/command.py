@@ -4,6 +4,7 @@
 
 import argparse
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from damadics_fd.commands.commission.control_room import identify as identify_sc
 from damadics_fd.commands.commission.errors import CommissioningError
 from damadics_fd.commands.commission.monitor import identify
 from damadics_fd.commands.commission.plot import draw
-from damadics_fd.commands.commission.twin import write_twin
+from damadics_fd.commands.commission.twin import model, write_twin
 from damadics_fd.commands.commission.valve_file import parameter_file
 from damadics_fd.commands.options import add_settings, add_sources, settings_in
 from damadics_fd.core.record import Floats, Ints
@@ -174,7 +175,11 @@ def _identify(
         draw(proposal, options.plot)
     if options.twin:
         write_twin(proposal, options.twin, options.actuator)
-    return proposal.identified(Settings.for_mode('monitor'))
+    found = proposal.identified(Settings.for_mode('monitor'))
+    try:
+        return replace(found, twin=model(proposal, options.actuator))
+    except CommissioningError as error:  # the simulated actuator cannot be every valve
+        return replace(found, report=(*found.report, f'note: {error}'))
 
 
 def _write_reference(
@@ -196,6 +201,7 @@ def _write_reference(
             source=source,
             first_stamp=int(recordings[0].columns['stamp'][0]),
             last_stamp=int(recordings[-1].columns['stamp'][-1]),
+            commissioning=identified.judgement(),
         ),
     )
     print(f'reference of {options.actuator}: {written}')

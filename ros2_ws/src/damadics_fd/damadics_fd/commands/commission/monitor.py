@@ -74,7 +74,18 @@ class Proposal:
             tuple(report(self)),
             (*self.refusing, *self.limiting),
             self.result.estimator.learned() if self.result.estimator.monitoring else {},
+            {
+                'friction_in_a_minute': _rounded(self.minute.friction),
+                'spring_in_a_minute': _rounded(self.minute.spring),
+                'friction_in_an_hour': _rounded(self.hour.friction),
+                'spring_in_an_hour': _rounded(self.hour.spring),
+                'misfit': _rounded(self.balance.misfit / max(self.balance.total, 1e-9)),
+            },
         )
+
+
+def _rounded(share: float) -> float:
+    return float(f'{min(share, 1e6):.3g}')
 
 
 def identify(

@@ -10,9 +10,10 @@ from damadics_fd.commands.commission.errors import CommissioningError
 from damadics_fd.commands.commission.monitor import Proposal
 from damadics_fd.commands.commission.regression import regressor
 from damadics_fd.commands.commission.signals import Blocks, Signals, blocks, gather
-from damadics_fd.commands.commission.valve_file import quoted, value_text
-from damadics_fd.core.record import Floats
+from damadics_fd.commands.commission.valve_file import rows
+from damadics_fd.core.record import Floats, Saved
 from damadics_fd.core.settings import Settings
+from damadics_fd.core.settings.document import differing
 from damadics_fd.core.settings.identified import FaultFree
 
 ATMOSPHERE, GAS = 101325.0, 287.0 * 293.0  # Pa; R T of air [J/kg]
@@ -39,24 +40,28 @@ def write_twin(proposal: Proposal, path: Path, actuator: str = '') -> None:
     :raises CommissioningError: for a valve that the simulated actuator cannot be.
     :raises OSError: where the file cannot be written.
     """
-    constants = twin(proposal)
     lines = [
         '# twin of a valve, written by commission: run it with',
         '#   ros2 run damadics_plant simulate nominal --valve FILE --out run.mcap',
-        f'{TWIN}:',
-        f'  actuator: {quoted(actuator)}',
-        f'  sample_rate: {value_text(proposal.settings.sample_rate)}',
+        *rows(model(proposal, actuator) | {'settings': differing(proposal.settings)}, ''),
     ]
-    lines += [f'  {name}: {value_text(value)}' for name, value in constants.items()]
-    lines.append('settings:')
-    usual = Settings.for_mode('monitor').to_dict()
-    for name, value in proposal.settings.to_dict().items():
-        if value != usual[name]:
-            lines.append(f'  {name}: {value_text(value)}')
-    lines.append(f'{OPERATION}:')
-    for name, value in operation(proposal).items():
-        lines.append(f'  {name}: {value_text(value)}')
     path.write_text('\n'.join(lines) + '\n', encoding='utf-8')
+
+
+def model(proposal: Proposal, actuator: str = '') -> Saved:
+    """
+    Return what the plant takes of a twin, by the parts of its file.
+
+    :param proposal: what commission found in mode monitor.
+    :param actuator: tag of the valve.
+    :return: constants of the actuator, and at what pressures it worked.
+    :raises CommissioningError: for a valve that the simulated actuator cannot be.
+    """
+    constants: Saved = {'actuator': actuator, 'sample_rate': proposal.settings.sample_rate}
+    constants.update(twin(proposal))
+    pressures: Saved = {}
+    pressures.update(operation(proposal))
+    return {TWIN: constants, OPERATION: pressures}
 
 
 def twin(proposal: Proposal) -> dict[str, float]:

@@ -1,9 +1,18 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The file of a valve: what differs from the defaults, tag and reference, and the verdict."""
+"""The file of a valve: what differs from the defaults, tag and reference, verdict, twin."""
+
+from collections.abc import Iterator, Mapping
 
 from damadics_fd.core.record import Plain
 from damadics_fd.core.settings import Settings
+from damadics_fd.core.settings.document import (
+    COMMISSION,
+    ESTIMATOR,
+    EVERY_NODE,
+    PARAMETERS,
+    PLANT,
+)
 from damadics_fd.core.settings.identified import Identified
 
 WIDTH = 96
@@ -26,7 +35,7 @@ def parameter_file(
     for line in found.report:
         if not line.startswith('verdict'):
             lines += [f'# {part}' for part in _wrapped(line)]
-    lines += ['/**:', '  ros__parameters:', f'    mode: {mode}']
+    lines += [f'{EVERY_NODE}:', f'  {PARAMETERS}:', f'    mode: {mode}']
     if actuator:
         lines.append(f'    actuator: {quoted(actuator)}')
     described = {row['name']: row for row in Settings.describe(mode)}
@@ -40,8 +49,36 @@ def parameter_file(
             f'    {name}: {value_text(found.settings[name])}',
         ]
     if reference:
-        lines += ['/**/estimator:', '  ros__parameters:', f'    reference: {quoted(reference)}']
+        lines += _section(ESTIMATOR, {'reference': reference})
+    lines += _section(COMMISSION, found.judgement())
+    if found.twin:
+        lines += _section(PLANT, found.twin)
     return '\n'.join(lines) + '\n'
+
+
+def _section(node: str, parameters: Mapping[str, Plain]) -> Iterator[str]:
+    yield f'{node}:'
+    yield f'  {PARAMETERS}:'
+    yield from rows(parameters, '    ')
+
+
+def rows(values: Mapping[str, Plain], indent: str) -> Iterator[str]:
+    """
+    Write a mapping in block style.
+
+    :param values: by name; mappings within it, too.
+    :param indent: what each line begins with.
+    :return: lines of YAML.
+    """
+    for name, value in values.items():
+        if isinstance(value, dict):
+            yield f'{indent}{name}:'
+            yield from rows(value, f'{indent}  ')
+        elif isinstance(value, list) and value and all(isinstance(v, str) for v in value):
+            yield f'{indent}{name}:'
+            yield from (f'{indent}- {quoted(str(v))}' for v in value)
+        else:
+            yield f'{indent}{name}: {value_text(value)}'
 
 
 def value_text(value: Plain) -> str:

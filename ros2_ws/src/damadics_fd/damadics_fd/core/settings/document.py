@@ -22,6 +22,8 @@ from damadics_fd.core.record import Plain, Saved
 from damadics_fd.core.settings.settings import Settings
 
 EVERY_NODE, ESTIMATOR, PARAMETERS = '/**', '/**/estimator', 'ros__parameters'
+COMMISSION, PLANT = '/**/commission', '/**/plant'
+"""Sections of what is no parameter of a monitor: the verdict, and a model of the valve."""
 
 
 @dataclass(frozen=True)
@@ -81,10 +83,10 @@ def differing(settings: Settings) -> Saved:
 
 def parameters_in(content: Plain) -> Saved:
     """
-    Return all parameters in the content of a parameter file, whichever node they are for.
+    Return all parameters in the content of a parameter file, whichever monitor node they are for.
 
     :param content: what the file's YAML holds.
-    :return: values by name.
+    :return: values by name; verdict and model of the valve are left out.
     :raises SettingsError: where there are none.
     """
     merged: Saved = {}
@@ -96,10 +98,25 @@ def parameters_in(content: Plain) -> Saved:
 
 
 def _nodes(content: Plain) -> Iterator[Saved]:
-    for node in content.values() if isinstance(content, dict) else ():
-        parameters = node.get(PARAMETERS) if isinstance(node, dict) else None
-        if isinstance(parameters, dict):
-            yield parameters
+    for name in content if isinstance(content, dict) else ():
+        if name not in (COMMISSION, PLANT):
+            yield section(content, name)
+
+
+def section(content: Plain, name: str) -> Saved:
+    """
+    Return one section of a parameter file.
+
+    :param content: what the file's YAML holds.
+    :param name: of the node, such as COMMISSION.
+    :return: its parameters; {} where there is no such section.
+
+    >>> section({'/**/commission': {'ros__parameters': {'verdict': 'ok'}}}, COMMISSION)
+    {'verdict': 'ok'}
+    """
+    node = content.get(name) if isinstance(content, dict) else None
+    parameters = node.get(PARAMETERS) if isinstance(node, dict) else None
+    return parameters if isinstance(parameters, dict) else {}
 
 
 def _text(value: Plain) -> str:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from damadics_fd.core.record import Plain
+from damadics_fd.core.record import Plain, Saved
 
 OK, LIMITED, REFUSED = 'ok', 'limited', 'refused'
 VERDICTS = (OK, LIMITED, REFUSED)
@@ -22,6 +22,22 @@ class Identified:
     report: tuple[str, ...]  # lines for people: what was found, in the order to be printed
     reasons: tuple[str, ...] = ()  # why it is not OK: what does not fit, what will be missed
     learned: Mapping[str, Plain] = field(default_factory=dict)  # for a reference; {}: none
+    numbers: Mapping[str, float] = field(default_factory=dict)  # what the verdict rests on
+    twin: Mapping[str, Plain] = field(default_factory=dict)  # model for the plant; {}: none
+
+    def judgement(self) -> Saved:
+        """
+        Return the verdict as the file of the valve and the reference keep it.
+
+        :return: `verdict`; `reasons` where it is not OK; `report`, the lines that were printed;
+            and the numbers.
+        """
+        kept: Saved = {'verdict': self.verdict}
+        if self.reasons:
+            kept['reasons'] = list(self.reasons)
+        kept['report'] = list(self.report)
+        kept.update(self.numbers)
+        return kept
 
 
 @dataclass(frozen=True)
