@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the system tests share: a domain of their own, processes, a node of the test."""
 
+import os
 import time
 from pathlib import Path
 from typing import NamedTuple
@@ -80,6 +81,11 @@ def children(process: int) -> list[Child]:
         valve = next((w.removeprefix('__ns:=/') for w in words if w.startswith('__ns:=')), '')
         found.append(Child(Path(words[1]).name, valve, int(number)))
     return found
+
+
+def promised(seconds: float) -> float:
+    """Return what a promised time becomes on a machine of which others take their share."""
+    return seconds * max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))
 
 
 def alone(patch: pytest.MonkeyPatch, folder: Path) -> int:

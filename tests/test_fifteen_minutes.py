@@ -8,7 +8,6 @@ The tests build on each other: one simulated valve, started by one command, serv
 
 import json
 import os
-import re
 import signal
 import subprocess
 from pathlib import Path
@@ -17,7 +16,7 @@ from types import SimpleNamespace
 import pytest
 import website
 import yaml
-from conftest import Peer, alone, children
+from conftest import Peer, alone, children, promised
 from damadics_bringup.processes import Processes, executable, surroundings
 from damadics_fd.ros import qos
 from damadics_msgs.msg import FaultEvent, FaultFlag
@@ -26,8 +25,6 @@ from damadics_msgs.srv import InjectFault
 pytestmark = pytest.mark.ros
 VALVE = 'lv101'
 FRICTION = 4  # f4, servomotor and stem friction
-LUBLIN = Path(__file__).resolve().parents[2] / 'shared/data/lublin_actuator3_20min_1hz.csv'
-LEARNED = 900.0  # s, the end of learning in mode scada
 
 
 @pytest.fixture(scope='module')
@@ -164,11 +161,11 @@ def ended(restarted):
 
 def test_one_command_shows_a_friction_fault(faulted):
     assert not faulted.early
-    assert faulted.shown_after < 1.0
+    assert faulted.shown_after < promised(1.0)
 
 
 def test_a_killed_detector_greys_the_tile_and_its_alarm_comes_back(restarted):
-    assert restarted.grey_after < 1.0
+    assert restarted.grey_after < promised(1.0)
     assert all(flag.fault for flag in restarted.since), 'the alarm was lost'
     assert {flag.occurrence for flag in restarted.since} == {restarted.occurrence}
 
@@ -202,70 +199,3 @@ def test_a_truncated_bag_is_replayed(ended):
     (result,) = replayed(torn, *QUICKLY, code=3)  # something is missing
     assert result['detections'][0]['stamp'] == rises(ended)[0]
     assert result['problems']
-
-
-def stuck(since: float, folder: Path) -> Path:
-    """Write the plant's record with the stem standing still from some instant on [s]."""
-    head, *lines = LUBLIN.read_text().splitlines()
-    position = head.split(',').index('L74_20X_X_pct')
-    rows = [line.split(',') for line in lines]
-    held = next(row[position] for row in rows if float(row[0]) >= since)
-    for row in rows:
-        if float(row[0]) >= since:
-            row[position] = held
-    path = folder / f'stuck_{since:.0f}.csv'
-    path.write_text('\n'.join([head, *(','.join(row) for row in rows), '']))
-    return path
-
-
-@pytest.mark.skipif(
-    not LUBLIN.is_file(), reason=f'{LUBLIN} is not there: it carries no redistribution licence'
-)
-def test_the_real_plant_gives_no_alarm_and_a_stuck_stem_one(domain, tmp_path):
-    instants = [LEARNED + 50.0 * n for n in range(1, 6)]
-    files = [stuck(since, tmp_path) for since in instants]
-    healthy, *faulty = replayed(LUBLIN, *files, '--mode', 'scada')
-    assert healthy['samples'] == 1200
-    assert healthy['detections'] == []
-    delays = [r['detections'][0]['t'] - t for r, t in zip(faulty, instants, strict=True)]
-    print('delays after the stem is stuck, s:', delays)
-    assert all(0.0 <= delay <= 20.0 for delay in delays)
-
-
-def test_the_report_compares_with_what_else_there_is(tmp_path, chromium, monkeypatch):
-    pytest.importorskip('filterpy')
-    pytest.importorskip('river')
-    evaluate = executable('damadics_evaluate', 'evaluate')
-    campaign = [
-        'run',
-        '--out',
-        str(tmp_path),
-        '--scenarios',
-        'f16_B',
-        '--detectors',
-        'scada',
-        'cusum',
-        'ekf',
-        'adwin',
-        '--calibration-days',
-        '1',
-        '--isolated-seeds',
-        '0',
-    ]
-    monkeypatch.setenv('DAMADICS_FD_CACHE', str(tmp_path / 'cache'))
-    done = subprocess.run([evaluate, *campaign], capture_output=True, text=True, timeout=250)
-    assert done.returncode == 0, done.stderr
-    report = tmp_path / 'index.html'
-    if chromium:
-        page = chromium.new_page()
-        errors: list[str] = []
-        page.on('pageerror', lambda error: errors.append(str(error)))
-        page.goto(report.as_uri())
-        heads = page.locator('table').first.locator('th').all_inner_texts()
-        page.close()
-        assert not errors
-    else:
-        table = report.read_text().partition('<table')[2].partition('</thead>')[0]
-        heads = re.findall(r'<th[^>]*>([^<]*)', table)
-    for name in ('SCADA-rate monitor', 'CUSUM', 'EKF', 'ADWIN'):
-        assert any(head.strip().startswith(name) for head in heads), f'{name} is not in {heads}'

@@ -7,7 +7,7 @@ import time
 from types import SimpleNamespace
 
 import pytest
-from conftest import Peer, alone
+from conftest import Peer, alone, promised
 from damadics_bringup.launcher import arguments_of
 from damadics_bringup.policy import policy
 from damadics_bringup.processes import Processes, executable, parameters, surroundings
@@ -135,7 +135,7 @@ def test_a_killed_estimator_stops_the_monitoring_within_half_a_second(valve, pla
     assert valve.run_until(lambda: valve.flags[-1].state == FaultFlag.STATE_HEALTHY, patience=30.0)
     valve.run(1.0)
     assert valve.flags[-1].occurrence == occurrence, 'the restart raised an alarm'
-    assert took < 0.5 + 1.0, 'timeout, one look and the steps of the test on a busy machine'
+    assert took < promised(0.5 + 1.0), 'timeout, one look and the steps of the test'
 
 
 def test_a_second_publisher_on_measurement_is_reported(valve):

@@ -44,7 +44,7 @@ def at_scada_rate(scenario: str) -> dict[str, np.ndarray]:
 @pytest.mark.parametrize(
     ('mode', 'source', 'speeds', 'changes'),
     [
-        ('paper', lambda: excerpt('dablib_spring', 66.0, 74.0), (2, 8), {}),
+        ('paper', lambda: excerpt('dablib_spring', 66.0, 74.0), (8,), {}),
         ('monitor', lambda: excerpt('lugre_spring', 52.0, 72.0), (4,), QUICK),
         ('scada', lambda: at_scada_rate('f16_B'), (150,), {}),
     ],

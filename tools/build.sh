@@ -31,6 +31,10 @@ if ! (cd ros2_ws && "$python" -m colcon --log-base log build --event-handlers co
   echo "The build failed; the whole output is in $log." >&2
   exit 1
 fi
+if [ -n "${PYTHONDONTWRITEBYTECODE:-}" ]; then
+  # Else each process would compile again what it imports: half the time that a node takes to start.
+  "$python" -m compileall -qq -j 0 -x '/tests?/' .venv/lib ros2_ws/install ros2_ws/src || true
+fi
 echo 'Compiling the hot loops ...'
 set +u; source ./env.sh; set -u
 python tools/compile_kernels.py demo
