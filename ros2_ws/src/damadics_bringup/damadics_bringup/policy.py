@@ -9,6 +9,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from damadics_dashboard.live.record import ACTIONS
 from damadics_fd.ros.arguments import command_parser
 from damadics_fd.store.fleet_file import FleetError, Valve, read_fleet
 
@@ -38,15 +39,6 @@ LIFECYCLE = (
 SAMPLES = ('measurement', 'estimate', 'threshold', 'fault_flag', 'fault_event')
 SHOWN = (*SAMPLES, 'signature', 'isolation', 'operator_action')  # by the page
 ALL = (*SAMPLES, 'residual', 'signature', 'fault_state', 'operator_action', 'isolation')
-OPERATE = (
-    'acknowledge',
-    'reset',
-    'shelve',
-    'relearn',
-    'save_reference',
-    'load_reference',
-    'partial_stroke',
-)
 
 
 @dataclass
@@ -112,7 +104,7 @@ def policy(
         for node, rights in {**NODES, **({'plant': PLANT} if simulate else {})}.items():
             shared = process_of.get(valve.name, '') if node in MONITORS else ''
             _enclave(enclaves, f'/{valve.name}', node, _of_valve(rights, valve), shared)
-    operate = (*OPERATE, 'inject_fault') if simulate else OPERATE
+    operate = (*ACTIONS, 'inject_fault') if simulate else ACTIONS
     page = _all(valves, Rights((), SHOWN, (), operate))
     _enclave(
         enclaves, '/', 'dashboard', Rights((), (*page.subscribe, '/diagnostics'), (), page.request)

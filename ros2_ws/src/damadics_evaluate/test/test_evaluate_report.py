@@ -190,6 +190,8 @@ def test_a_campaign_that_is_killed_goes_on(tmp_path):
     process.wait()
     before = {r['scenario']: r for r in read_results(out)}
     assert before
+    with file.open('a') as stream:
+        stream.write('{"kind": "scenario", "scen')  # torn by the kill
     subprocess.run(command, env=environment, check=True, timeout=250, capture_output=True)
     after = read_results(out)
     assert sorted(r['scenario'] for r in after) == sorted(scenarios)  # each once

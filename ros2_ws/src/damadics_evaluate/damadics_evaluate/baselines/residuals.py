@@ -134,23 +134,13 @@ class CusumOnDeviation(Deviation):
         return np.asarray(_cusum(z, self.k, self.ceiling))
 
 
-class FirCusum(FirResidual):
-    """Two-sided CUSUM of the FIR residual."""
+class FirCusum(CusumOnDeviation, FirResidual):
+    """The same of the FIR residual."""
 
     name, title = 'fir_cusum', 'FIR(4) + CUSUM(1)'
-    plant_limit = 12.0
-    ceiling = math.inf
 
     def __init__(self, k: float = 1.0) -> None:
-        self.k = k
-
-    def prepare_for_plant(self) -> None:
-        """Bound the sums at twice the limit."""
-        super().prepare_for_plant()
-        self.ceiling = 2.0 * self.plant_limit
-
-    def _test(self, z: Floats) -> Floats:
-        return np.asarray(_cusum(z, self.k, self.ceiling))
+        super().__init__(k)
 
 
 class Glr(FirResidual):

@@ -10,6 +10,7 @@ from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
+from typing import TextIO
 
 from damadics_evaluate.baselines import DETECTORS
 from damadics_evaluate.benchmark.campaign import (
@@ -158,7 +159,7 @@ def _collect(
     futures = [executor.submit(function, *arguments) for function, arguments in units]
     results = []
     with (
-        (directory / RESULTS).open('a', encoding='utf-8') as stream,
+        _appending(directory / RESULTS) as stream,
         tqdm(total=len(futures), desc=what, unit='run', disable=not futures) as bar,
     ):
         try:
@@ -173,6 +174,14 @@ def _collect(
                 future.cancel()
             raise
     return results
+
+
+def _appending(file: Path) -> TextIO:
+    """Open the results to add to them; what a kill has torn stays a line of its own."""
+    stream = file.open('a', encoding='utf-8')
+    if file.stat().st_size and not file.read_bytes().endswith(b'\n'):
+        stream.write('\n')
+    return stream
 
 
 @contextmanager

@@ -23,9 +23,9 @@ CORE = Path(__file__).parent
 
 
 @lru_cache
-def _core() -> bytes:
-    """Return the sources of the core, read once for all its rooms."""
-    return b''.join(source.read_bytes() for source in sorted(CORE.rglob('*.py')))
+def _core() -> 'hashlib._Hash':
+    """Return the digest of the core's sources, made once for all its rooms."""
+    return hashlib.sha256(b''.join(p.read_bytes() for p in sorted(CORE.rglob('*.py'))))
 
 
 @lru_cache
@@ -33,7 +33,7 @@ def _cache(folder: Path) -> str:
     # numba's own cache notices a change of the function's file, but not of the files of the
     # functions that it calls: a loop would go on with the steps of yesterday. So every state
     # of the sources has a cache of its own.
-    digest = hashlib.sha256(_core())
+    digest = _core().copy()
     if not folder.is_relative_to(CORE):
         for source in sorted(folder.rglob('*.py')):
             digest.update(source.read_bytes())

@@ -20,6 +20,7 @@ from .bag_support import needs_messages, simulated
 from .test_spool import Disk, number, wait_until
 
 pytestmark = needs_messages
+plain = pytest.mark.plain  # short as plain Python, too
 FLOAT = 'std_msgs/msg/Float64'
 FLAG = 'damadics_msgs/msg/FaultFlag'
 LATCHED = qos(durability='transient_local', depth=3)
@@ -97,6 +98,7 @@ def test_a_thousand_topics_are_written_read_and_recovered(tmp_path):
     assert (result.code, result.saved.messages, len(result.saved.topics)) == (WHOLE, 3000, 1000)
 
 
+@plain
 def test_a_recording_is_never_overwritten(tmp_path):
     write_columns(tmp_path / 'a.mcap', simulated(50))
     before = (tmp_path / 'a.mcap').read_bytes()
@@ -108,6 +110,7 @@ def test_a_recording_is_never_overwritten(tmp_path):
     assert (tmp_path / 'a.mcap').read_bytes() == before
 
 
+@plain
 def test_latched_messages_stand_at_the_head_of_every_split(tmp_path):
     with BagWriter(tmp_path / 'bag', split_seconds=1.0) as bag:
         event, sample = bag.add_topic('/event', FLOAT, [LATCHED]), bag.add_topic('/a', FLOAT)
@@ -140,6 +143,7 @@ def feed(box, samples: int, rise: int) -> None:
             box.write(flags, flag(True), i * 10**8, i * 10**8)
 
 
+@plain
 def test_black_box_bags_begin_with_the_latched_messages_of_before(tmp_path):
     box = BlackBox(tmp_path, 2.0, 1.0)
     feed(box, 100, 60)
@@ -152,6 +156,7 @@ def test_black_box_bags_begin_with_the_latched_messages_of_before(tmp_path):
     assert inspect(tmp_path / 'event_000').code == WHOLE
 
 
+@plain
 def test_a_fault_while_the_disk_is_full_is_written_once_there_is_room(tmp_path, monkeypatch):
     disk = Disk(monkeypatch)
     box = BlackBox(tmp_path, 2.0, 1.0)
@@ -172,6 +177,7 @@ def test_a_fault_while_the_disk_is_full_is_written_once_there_is_room(tmp_path, 
     assert inspect(tmp_path / 'event_000').code == WHOLE
 
 
+@plain
 def test_a_disk_that_stays_full_costs_what_is_told(tmp_path, monkeypatch):
     disk = Disk(monkeypatch)
     bag = BagWriter(tmp_path / 'bag', chunk_size=2000, flush_period=0.05)
@@ -210,6 +216,7 @@ def test_a_split_on_a_full_disk_loses_nothing(tmp_path, monkeypatch, split):
     assert inspect(tmp_path / 'bag').code == WHOLE
 
 
+@plain
 def test_a_folder_that_is_removed_is_made_again_with_all_that_was_in_the_file(tmp_path):
     with BagWriter(tmp_path / 'bag') as bag:
         topic = bag.add_topic('/a', FLOAT)

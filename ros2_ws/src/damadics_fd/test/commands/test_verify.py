@@ -10,6 +10,7 @@ from damadics_fd.bag import BagWriter
 from damadics_fd.bag.checking.timing import Timing
 from damadics_fd.commands.verify import main
 
+pytestmark = pytest.mark.plain
 MILLISECOND = 1_000_000
 FLOAT = 'std_msgs/msg/Float64'
 

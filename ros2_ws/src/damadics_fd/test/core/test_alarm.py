@@ -22,6 +22,7 @@ from damadics_fd.core.modes import PHASE_HOLD, PHASE_LEARN_PHI
 from .residuals import TICK, Valve
 
 
+@pytest.mark.plain
 def test_a_single_spike_is_a_near_miss():  # IN-3, AM-2
     valve = Valve()
     valve.feed(0.1, 1.0)
@@ -32,6 +33,7 @@ def test_a_single_spike_is_a_near_miss():  # IN-3, AM-2
     assert valve.detector.statistics == {'occurrences': 0, 'near_misses': 1, 'chatter': 0}
 
 
+@pytest.mark.plain
 def test_m_of_n_counts_samples_that_are_not_in_a_row():
     valve = Valve(decide_m=3, decide_n=5)
     for ratio in (1.2, 0.1, 1.2, 0.1):
@@ -41,6 +43,7 @@ def test_m_of_n_counts_samples_that_are_not_in_a_row():
     assert valve.events[0].onset == TICK
 
 
+@pytest.mark.plain
 def test_decision_shorter_than_the_on_delay_is_a_near_miss():  # AM-2
     valve = Valve(on_delay=0.5)
     valve.feed(1.5, 0.4)
@@ -65,6 +68,7 @@ def test_chattering_condition_is_one_alarm():  # AM-1
     assert without.detector.statistics['chatter'] == 1
 
 
+@pytest.mark.plain
 def test_returned_alarm_stays_until_a_person_has_seen_it():  # AM-3, AM-4, AM-5
     valve = Valve()
     assert valve.feed(1.2, 1.0).state == STATE_ALARM
@@ -82,6 +86,7 @@ def test_returned_alarm_stays_until_a_person_has_seen_it():  # AM-3, AM-4, AM-5
     assert not valve.feed(0.1).fault
 
 
+@pytest.mark.plain
 def test_new_evidence_of_a_latched_alarm_is_no_new_alarm():  # AM-4, AL-7
     valve = Valve()
     valve.feed(1.2, 1.0)
@@ -110,6 +115,7 @@ def test_a_resting_stem_ends_no_alarm():
     assert valve.names() == ['raised', 'cleared']
 
 
+@pytest.mark.plain
 def test_levels_rise_with_the_ratio():
     valve = Valve()
     assert valve.feed(1.1, 0.1).level == alarm.MAINTENANCE_REQUIRED
@@ -137,6 +143,7 @@ def test_shelf_masks_records_and_ends_by_itself():  # AM-6
     assert not valve.detector.unshelve().done
 
 
+@pytest.mark.plain
 def test_alarm_survives_a_restart():  # AM-7
     valve = Valve()
     valve.feed(1.7, 1.0)
@@ -150,6 +157,7 @@ def test_alarm_survives_a_restart():  # AM-7
     assert again.feed(0.1) == valve.feed(0.1)
 
 
+@pytest.mark.plain
 @pytest.mark.parametrize(
     'damage',
     [
@@ -186,6 +194,7 @@ def test_damaged_alarm_state_is_refused_whole(damage):
     assert valve.detector.save() == before
 
 
+@pytest.mark.plain
 def test_an_alarm_state_of_0_1_is_taken_up():
     valve = Valve()
     valve.feed(1.7, 1.0)
@@ -196,6 +205,7 @@ def test_an_alarm_state_of_0_1_is_taken_up():
     assert again.detector.decision.fault
 
 
+@pytest.mark.plain
 @pytest.mark.parametrize('confirm', ['acknowledge', 'reset_alarm'])
 def test_a_lost_alarm_is_shown_as_lost_until_a_person_has_seen_it(confirm):
     valve = Valve()
@@ -214,6 +224,7 @@ def test_a_lost_alarm_is_shown_as_lost_until_a_person_has_seen_it(confirm):
     assert not getattr(valve.detector, confirm)().done
 
 
+@pytest.mark.plain
 def test_a_new_alarm_is_shown_above_a_lost_one():
     valve = Valve()
     valve.detector.lose()
@@ -247,6 +258,7 @@ def test_clock_set_back_keeps_the_alarm():  # TI-5
     assert valve.feed(0.1, 2.0).state == STATE_LATCHED
 
 
+@pytest.mark.plain
 def test_gates_at_the_stops():  # AL-4
     valve = Valve()
     assert not valve.feed(5.0, 0.1, x=0.005).fault  # pushed open by the stop

@@ -18,8 +18,6 @@ from hypothesis import settings as profile
 
 from .synthetic import valve
 
-pytestmark = pytest.mark.plain
-
 SETTINGS = Settings.for_mode('monitor', own_alarm=False)
 QUICK = SETTINGS.replace(t_on=0.0, t_w=0.05, t_learn=0.2, travel_min=0.0)
 SIGNALS = ('cv', 'x1', 'p1', 'p2', 't1', 'flow', 'ps')
@@ -72,6 +70,7 @@ def test_refused_sample_leaves_no_trace(armed, signal):  # IN-1, IN-2
     assert signal in dirty.estimator.last_rejection or dirty.estimator.last_rejection == ''
 
 
+@pytest.mark.plain
 def test_reason_names_the_signal():
     estimator = Estimator(SETTINGS)
     assert (
@@ -84,6 +83,7 @@ def test_reason_names_the_signal():
     assert estimator.status == 'waiting for the first good sample'
 
 
+@pytest.mark.plain
 def test_unmeasured_signals_are_no_fault_in_paper_mode():
     estimator = Estimator(Settings.for_mode('paper'))
     assert estimator.update(0, 0.5, 0.5, *[math.nan] * 5).stamp == 0
@@ -246,6 +246,7 @@ def test_any_input_keeps_states_finite_and_weights_bounded(velocity, samples):  
         assert not decision.fault or estimate.phase == PHASE_MONITOR or decision.since < stamp
 
 
+@pytest.mark.plain
 def test_settings_list_all_errors_at_once():  # PR-5
     with pytest.raises(SettingsError) as caught:
         Settings.from_mapping(
@@ -280,6 +281,7 @@ def test_settings_list_all_errors_at_once():  # PR-5
         Settings.for_mode('papre')
 
 
+@pytest.mark.plain
 def test_settings_describe_themselves():
     for mode in ('paper', 'monitor'):
         rows = Settings.describe(mode)

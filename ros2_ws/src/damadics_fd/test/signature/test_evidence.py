@@ -33,6 +33,7 @@ from damadics_fd.core.signature.state import (
 )
 from damadics_fd.core.signature.sums import accumulate
 
+pytestmark = pytest.mark.plain
 COLUMNS = {1: [SIGN, V], 2: [X1], 3: [ONE], 4: [POSX], 5: [PB], 6: [G], 7: [POS]}
 WIDTH = {1: [0.2, 0.5], 2: [1.0], 3: [0.2], 4: [0.3], 5: [0.3], 6: [0.3], 7: [0.1]}
 PRIOR = [1.0, 0.45, 0.45, 0.03, 0.03, 0.03, 0.03, 0.03]

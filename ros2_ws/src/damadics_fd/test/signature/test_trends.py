@@ -17,6 +17,7 @@ def series(rng, n, slope, sigma, scatter=1.0):
     return t, slope * t + sigma * scatter * rng.standard_normal(n), np.full(n, sigma)
 
 
+@pytest.mark.plain
 def test_line_agrees_with_polyfit():
     rng = np.random.default_rng(0)
     t, y, s = series(rng, 50, 1e-6, 0.02)
@@ -26,6 +27,7 @@ def test_line_agrees_with_polyfit():
     assert line.slope == pytest.approx(slope) and line.level == pytest.approx(level)
 
 
+@pytest.mark.plain
 def test_band_and_time_to_limit_cover_the_truth():
     """90 % intervals hold the true line and the true time in about 90 % of 400 series."""
     rng = np.random.default_rng(1)
@@ -42,6 +44,7 @@ def test_band_and_time_to_limit_cover_the_truth():
     assert 340 <= band <= 384 and 340 <= time <= 384
 
 
+@pytest.mark.plain
 def test_scatter_beyond_the_stated_deviations_widens_the_band():
     rng = np.random.default_rng(2)
     calm = fit_line(*series(rng, 100, 0.0, 0.02))
@@ -49,6 +52,7 @@ def test_scatter_beyond_the_stated_deviations_widens_the_band():
     assert rough.at(1e5)[1] > 3.0 * calm.at(1e5)[1]
 
 
+@pytest.mark.plain
 def test_a_flat_or_leaving_trend_never_meets_its_limit():
     line = fit_line(np.arange(10.0), -0.01 * np.arange(10.0), np.full(10, 1e-4))
     assert line.time_to(0.5, 10.0).expected == math.inf
@@ -56,6 +60,7 @@ def test_a_flat_or_leaving_trend_never_meets_its_limit():
     assert line.time_to(-0.05, 10.0).expected == 0.0
 
 
+@pytest.mark.plain
 def test_trend_forgets_what_was_before_a_repair():
     rng = np.random.default_rng(3)
     t, y, s = series(rng, 400, 3e-6, 0.01)

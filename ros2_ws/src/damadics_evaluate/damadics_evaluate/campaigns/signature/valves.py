@@ -8,7 +8,7 @@ import numpy as np
 from damadics_fd.core.decision.alarm import RAISED
 from damadics_fd.core.result import Result
 from damadics_fd.core.settings import Settings
-from damadics_fd.core.signature.state import CAUSES
+from damadics_fd.core.signature.state import CAUSE_ELASTIC, CAUSE_SUPPLY, CAUSES
 from damadics_plant import Actuator, Fault, LuGreActuator, Scenario, simulate
 from damadics_plant.actuator.parameters import RANGES
 from damadics_plant.scenarios.disturbance import CHAMBER_NOISE, HUM, WHITE
@@ -23,16 +23,7 @@ SETTINGS = Settings.for_mode('monitor', t_learn=60.0)
 FRICTION = {'friction_up', 'friction_down', 'stick_play'}
 
 
-ELASTIC = {
-    'elastic',
-    'spring_stiffer',
-    'spring_softer',
-    'preload',
-    'position_gain',
-    'pressure_gain',
-    'dp_offset',
-    'position_offset',
-}
+ELASTIC = set(CAUSES[CAUSE_ELASTIC:CAUSE_SUPPLY])
 
 
 Columns = dict[str, np.ndarray]

@@ -11,14 +11,17 @@ from damadics_fd.core.scada.samples import usable
 from damadics_fd.core.scada.step import accepts, step
 
 TRACE = np.dtype(
-    [
-        ('t', np.float64),
-        ('r1', np.float64),
-        ('r2', np.float64),
-        ('ratio', np.float64),
-        ('worst', np.int64),
-        ('alarm', np.bool_),
-    ]
+    (
+        np.record,
+        [
+            ('t', np.float64),
+            ('r1', np.float64),
+            ('r2', np.float64),
+            ('ratio', np.float64),
+            ('worst', np.int64),
+            ('alarm', np.bool_),
+        ],
+    )
 )
 
 

@@ -12,7 +12,7 @@ from damadics_fd.core.decision.detector import Detector
 from damadics_fd.core.modes import PHASE_MONITOR
 from damadics_fd.core.record import Ints
 from damadics_fd.nodes.alarm_memory import AlarmMemory
-from damadics_fd.nodes.fleet.members import Members
+from damadics_fd.nodes.fleet.members import Members, first_stamps
 from damadics_fd.store.references import (
     NoReferenceError,
     Reference,
@@ -71,9 +71,8 @@ class Keeping:
         :param valve: of rows that are about to be judged.
         :param stamp: of these rows [ns].
         """
-        for number in self._pending.intersection(valve.tolist()):
-            self._pending.discard(number)
-            self._memory(number).begin(int(stamp[np.argmax(valve == number)]))
+        for number, first in first_stamps(self._pending, valve, stamp):
+            self._memory(number).begin(first)
 
     def keep(self, number: int) -> None:
         """

@@ -199,3 +199,16 @@ def _members(valves: Sequence[Valve], problems: list[str]) -> Iterator[Member]:
 
 def _parameters(path: Path) -> Saved:
     return dict(parameters_in(yaml.safe_load(path.read_text(encoding='utf-8'))))
+
+
+def first_stamps(pending: set[int], valve: Ints, stamp: Ints) -> Iterator[tuple[int, int]]:
+    """
+    Yield the first stamp of each valve that is waited for, which is then waited for no longer.
+
+    :param pending: numbers of the valves; those found are taken out.
+    :param valve: of each row.
+    :param stamp: of each row [ns].
+    """
+    for number in pending.intersection(valve.tolist()):
+        pending.discard(number)
+        yield number, int(stamp[np.argmax(valve == number)])

@@ -9,7 +9,7 @@ import numpy as np
 from rclpy.node import Node
 
 from damadics_fd.core.record import Ints
-from damadics_fd.nodes.fleet.members import Members
+from damadics_fd.nodes.fleet.members import Members, first_stamps
 from damadics_fd.nodes.signature_publisher import SignaturePublisher
 from damadics_fd.ros.entities import Entities
 
@@ -75,9 +75,8 @@ class Signatures:
         :param valve: of rows that are about to be judged.
         :param stamp: of these rows [ns].
         """
-        for number in self._pending.intersection(valve.tolist()):
-            self._pending.discard(number)
-            self._publisher(number).begin(int(stamp[np.argmax(valve == number)]))
+        for number, first in first_stamps(self._pending, valve, stamp):
+            self._publisher(number).begin(first)
 
     def update(self) -> None:
         """Keep and publish what is new."""

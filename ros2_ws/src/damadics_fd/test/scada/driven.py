@@ -1,0 +1,49 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Short records of a control room: the stated actuator, with faults of the benchmark."""
+
+import numpy as np
+from damadics_fd.core.scada.laws.actuator import F_RANGE, P_RANGE, T_RANGE, valve_flow
+from damadics_fd.core.scada.model import FAULTS, STEM, advance_stem, start_stem
+from damadics_fd.core.scada.settings import ScadaSettings
+
+SETTINGS = ScadaSettings(learn_from_s=30.0, learn_s=270.0, t_on_s=40.0, settle_s=20.0)
+NOISE = 0.0014
+
+
+def driven(seconds: int, seed: int, at: int = 1 << 30, **faults: float) -> np.ndarray:
+    """
+    Return rows t, CV, X', P1', P2', T1', F' at 1 Hz of a valve that its command moves.
+
+    :param at: from when on the faults act [s]; f7: [K], f17: share of P1.
+    """
+    rng = np.random.default_rng(seed)
+    act = SETTINGS.record()['act'][0]
+    stem, none, some = np.zeros(1, STEM), np.zeros(1, FAULTS), np.zeros(1, FAULTS)
+    for name, strength in faults.items():
+        some[name] = strength
+    t = np.arange(float(seconds))
+    cv = 0.5 + 0.25 * np.sin(2 * np.pi * 0.02 * t) + 0.1 * np.sin(2 * np.pi * 0.007 * t)
+    p1, p2 = np.full(seconds, 3.5e6), np.full(seconds, 2.6e6)
+    t1 = np.full(seconds, 43.0)
+    p1[at:] *= 1.0 - faults.get('f17', 0.0)
+    t1[at:] += faults.get('f7', 0.0)
+    some['f7'] = some['f17'] = 0.0
+    drop = (p1 - p2) / P_RANGE
+    start_stem(stem[0], act, 0.0)
+    x, flow = np.empty(seconds), np.empty(seconds)
+    for k in range(seconds):
+        fault = some[0] if k >= at else none[0]
+        before = max(k - 1, 0)
+        x[k] = advance_stem(
+            stem[0], act, fault, k - 1.0, k, cv[before], cv[k], drop[before], drop[k], 0.0, 0.0
+        )
+        true = x[k] / (1.0 + 1.25 * fault.f13)
+        offset = 0.2 * fault.f2 - 0.1 * fault.f3
+        scale = (1.0 - 0.2 * fault.f2) * (1.0 + 0.1 * fault.f3)
+        f = valve_flow(act, true, p1[k], p2[k], t1[k], offset, scale, 0.1 * fault.f6, fault.f18)
+        flow[k] = min(1.0, (1.0 - 0.05 * fault.f5) * (1.0 - fault.f19) * f / F_RANGE)
+    clean = np.column_stack([x, p1 / P_RANGE, p2 / P_RANGE, t1 / T_RANGE, flow])
+    noisy = clean + rng.normal(0.0, NOISE, clean.shape)
+    noisy[:, -1] = np.clip(noisy[:, -1], 0.0, 1.0)  # the meter's range
+    return np.column_stack([t, cv, noisy])
