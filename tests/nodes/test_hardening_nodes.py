@@ -12,10 +12,10 @@ from damadics_bringup.processes import parameters
 from damadics_fd.ros import qos
 from damadics_msgs.msg import Estimate, FaultFlag, OperatorAction
 from damadics_msgs.srv import Acknowledge, Reference, ResetAlarm, Shelve
+from driven_valve import SETTINGS, start
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from std_srvs.srv import Empty as Empty
-from test_operations_nodes import SETTINGS, start
 
 pytestmark = pytest.mark.ros
 HEALTHY, UNKNOWN = FaultFlag.STATE_HEALTHY, FaultFlag.STATE_UNKNOWN

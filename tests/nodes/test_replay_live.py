@@ -21,7 +21,7 @@ from damadics_plant import simulate
 from rclpy.context import Context
 
 pytestmark = pytest.mark.ros
-GOLDEN = Path(__file__).parents[1] / 'bags'
+GOLDEN = Path(__file__).parents[2] / 'bags'
 # what the monitor learns from is shortened, so that it decides within the test
 QUICK = {'t_on': 0.5, 't_w': 1.0, 't_learn': 16.0, 'travel_min': 0.01}
 

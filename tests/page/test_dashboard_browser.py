@@ -23,7 +23,7 @@ pytestmark = [
         reason='no browser: apt-get install chromium for the tests of the page',
     ),
 ]
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 BAG = ROOT / 'bags' / 'lugre_friction.mcap'
 VALVE = 'lv101'
 PROMISED = 4.0  # updates of the plots a second, docs/operations.md
