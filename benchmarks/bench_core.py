@@ -24,24 +24,13 @@ from damadics_fd.core.monitor import run
 from damadics_fd.core.quality import Refused
 from damadics_fd.core.sample import COLUMNS
 from damadics_fd.core.settings import Settings
+from damadics_plant import simulate
 
 
 def recording(n: int, rate: float) -> dict[str, np.ndarray]:
-    """Return a noisy valve that moves all the time."""
-    rng = np.random.default_rng(0)
-    t = np.arange(n) / rate
-    x = 0.5 + 0.3 * np.sin(0.4 * t)
-    noisy = x + 1.4e-3 * rng.standard_normal(n)
-    return {
-        'stamp': (t * 1e9).astype(np.int64),
-        'cv': x,
-        'x1': noisy,
-        'p1': np.full(n, 3.5e6),
-        'p2': np.full(n, 2.6e6),
-        't1': np.full(n, 20.0),
-        'flow': np.full(n, 8.0),
-        'ps': 1.3e5 + 8e4 * (x + 0.01 * np.sign(np.cos(0.4 * t))),
-    }
+    """Return a healthy valve that moves all the time, with noisy sensors."""
+    run = simulate('random_nominal', rate, 'lugre', noise=True, duration=n / rate)
+    return {name: run[name][:n] for name in COLUMNS}
 
 
 def best(function: Callable[[], Any], repeat: int) -> float:

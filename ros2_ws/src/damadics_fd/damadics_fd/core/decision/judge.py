@@ -94,7 +94,7 @@ def step(s: State, c: Settings, g: Known, gc: SignatureSettings, e: Estimate, d:
 @jit
 def class_of(s: State, g: Known, gc: SignatureSettings, armed: bool) -> int:
     """
-    Return the NAMUR NE 107 class that is shown: the worse of residual and cause.
+    Return the NAMUR NE 107 class that an alarm shows: the worse of residual and cause.
 
     :param s: state record.
     :param g: state record of the signature.
@@ -103,8 +103,6 @@ def class_of(s: State, g: Known, gc: SignatureSettings, armed: bool) -> int:
     :return: a class; normal for a change too small for maintenance.
     """
     level: int = alarm.level_of(s, armed)
-    if not s.flag:
-        return level
     if s.peak < 1.0 and not own_alarm.material(g, gc, s.told > alarm.NORMAL):
         return alarm.NORMAL  # the approximator is content and the change is small
     return max(level, int(gc.ne107[g.cause]))
@@ -124,7 +122,7 @@ def report(s: State, g: Known, gc: SignatureSettings, e: Estimate, d: Decision) 
     armed = vote.armed(e.phase)
     d.stamp = e.stamp
     d.state = alarm.state_of(s, armed, e.phase)
-    d.level = class_of(s, g, gc, armed)
+    d.level = class_of(s, g, gc, armed) if s.flag else alarm.level_of(s, armed)
     d.fault = s.flag
     d.since = s.since
     d.onset = s.onset if s.active or s.latched else 0
@@ -172,13 +170,16 @@ def judge(
     kept = 0
     last = row = -1
     done = len(e)
+    newest = done - 1
+    while newest >= first and reason[newest] != 0:
+        newest -= 1
     for i in range(first, len(e)):
         if reason[i] != 0:
             continue
         last, row = i, i if keep else kept
         step(s[0], c[0], g[0], gc[0], e[i], d[row])
         news = d[row].transitions != 0
-        if keep or news:
+        if keep or news or i == newest:  # the only call: a second one costs a tenth of the loop
             report(s[0], g[0], gc[0], e[i], d[row])
         if news:
             kept += 1
@@ -186,7 +187,6 @@ def judge(
                 done = i + 1
                 break
     if last >= 0:
-        report(s[0], g[0], gc[0], e[last], d[row])
         judged[0] = e[last]
         latest[0] = d[row]
     return done, kept

@@ -9,7 +9,7 @@ force of a block share their time; a filtered force lags behind by several block
 
 import math
 
-from damadics_fd.core.jit import jit
+from damadics_fd.core.jit import jit, layer
 from damadics_fd.core.signature.settings import SignatureSettings
 from damadics_fd.core.signature.state import (
     LAG,
@@ -87,7 +87,7 @@ def open_block(s: Blocks, index: int) -> None:
     s.st = 0.0
 
 
-@jit
+@layer
 def add_sample(
     s: Blocks, c: SignatureSettings, offset: float, x: float, ps: float, dp: float
 ) -> None:
