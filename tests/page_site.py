@@ -23,6 +23,7 @@ from damadics_msgs.msg import (
     OperatorAction,
     Signature,
 )
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 
@@ -56,6 +57,7 @@ class Voices:
         self.node = rclpy.create_node('voices', context=self.context)
         self._publishers: dict[str, Any] = {}
         self._flags: dict[str, FaultFlag] = {}
+        self._told: dict[tuple[str, str], DiagnosticArray] = {}
         self._lock = threading.Lock()
         self.silent: set[str] = set()
         self.node.create_timer(0.25, self._beat)
@@ -101,6 +103,15 @@ class Voices:
             if valve not in self.silent:
                 flag.header.stamp = stamp
                 self.say(_topic(valve, 'fault_flag'), flag)
+        for told in list(self._told.values()):
+            self.say('/diagnostics', told, qos.DIAGNOSTICS)
+
+    def diagnose(self, valve: str, node: str = 'detector', tag: str = 'actuator', **told) -> None:
+        """Say from now on, once a second, what a node of a valve tells in its diagnostics."""
+        status = DiagnosticStatus(name=f'{valve}/{node}: {tag}', hardware_id=tag)
+        status.values = [KeyValue(key=k, value=v) for k, v in told.items()]
+        with self._lock:
+            self._told[valve, node] = DiagnosticArray(status=[status])
 
 
 def _topic(valve: str, name: str) -> str:

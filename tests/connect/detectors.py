@@ -9,7 +9,7 @@ import time
 import rclpy
 from damadics_fd.ros import qos
 from damadics_msgs.msg import FaultEvent, FaultFlag
-from damadics_msgs.srv import Acknowledge, ResetAlarm, Shelve
+from damadics_msgs.srv import Acknowledge, PartialStroke, ResetAlarm, Shelve
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 
@@ -37,6 +37,8 @@ class Detectors:
             for kind, name in ((Acknowledge, 'acknowledge'), (ResetAlarm, 'reset')):
                 self._serve(kind, valve, name)
             self._serve(Shelve, valve, 'shelve')
+            self._serve(PartialStroke, valve, 'partial_stroke')
+        self.strokes: list[tuple] = []
         self.node.create_timer(0.3, self._repeat)
         self.executor = SingleThreadedExecutor(context=self.context)
         self.executor.add_node(self.node)
@@ -98,6 +100,8 @@ class Detectors:
     def _serve(self, kind, valve: str, name: str) -> None:
         def answer(request, response):
             self.calls.append((valve, name, request.user, request.comment))
+            if name == 'partial_stroke':
+                self.strokes.append((valve, request.amplitude, request.count))
             response.success = name != 'reset'
             response.message = f'{name} of {valve}'
             if name == 'acknowledge':

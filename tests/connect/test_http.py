@@ -102,6 +102,9 @@ def test_json_events_actions_and_metrics_of_an_alarm(served):
     refused = client.post('/api/reset/lv101', json={})
     assert refused.status_code == 409 and refused.json()['done'] is False
     assert client.post('/api/shelve/area/lv103', json={'duration': 60.0}).status_code == 200
+    strokes = client.post('/api/partial_stroke/lv101', json={'amplitude': 0.05, 'count': 3})
+    assert strokes.status_code == 200 and detectors.strokes == [('lv101', 0.05, 3)]
+    assert detectors.calls[-1] == ('lv101', 'partial_stroke', 'Ann Example', '')
     history = client.get('/api/history', params={'valve': 'lv101'}).json()
     assert [each['transition'] for each in history] == ['acknowledged', 'raised']
 

@@ -255,6 +255,8 @@ def test_a_phone_shows_every_page_without_sideways_scrolling(system, address):
     phone.wait_for_selector('main')
     phone.wait_for_timeout(700)
     assert phone.evaluate('document.documentElement.scrollWidth') <= 390
+    tallest = "[...document.querySelectorAll('table.list tr')].map(r => r.offsetHeight)"
+    assert max(phone.evaluate(tallest), default=0) < 300, 'a row is squeezed into a column'
     assert phone.evaluate("document.body.classList.contains('body--dark')")
     if address.startswith('/valve'):
         phone.wait_for_timeout(1500)

@@ -10,8 +10,10 @@ import page_site
 import pytest
 import website
 from conftest import promised
+from damadics_dashboard.words.texts import texts
 from damadics_fd.ros import qos
 from damadics_msgs.msg import FaultEvent, FaultFlag, Isolation, OperatorAction
+from damadics_msgs.srv import PartialStroke
 
 sync_api = pytest.importorskip('playwright.sync_api')
 pytestmark = [
@@ -156,6 +158,8 @@ def test_a_page_whose_server_is_gone_turns_grey_within_two_seconds(site, browser
         assert time.monotonic() - stopped < promised(2.0)
         assert set(kinds(page)) == {grey}
         assert page.title().startswith('(no connection)')
+        line = "getComputedStyle(document.querySelector('[data-valve=watched] .state b'))"
+        assert page.evaluate(f'{line}.textDecorationLine') == 'line-through', 'no word of health'
         assert 'No connection' in page.locator('#link').inner_text()
         age = page.locator('[data-valve=watched] [data-age]').inner_text()
         page.wait_for_timeout(1500)
@@ -185,6 +189,44 @@ def test_a_silent_valve_shows_that_and_its_open_alarm(site, browser):
     page.close()
 
 
+def test_partial_strokes_are_asked_for_where_the_detector_allows_them(site, browser):
+    asked = []
+
+    def serve(request, response):
+        asked.append((request.amplitude, request.count, request.user, request.comment))
+        response.success, response.message = True, 'the driver was asked'
+        return response
+
+    voices, valve = site.voices, 'stroked'
+    voices.node.create_service(PartialStroke, f'/{valve}/partial_stroke', serve)
+    told = {'Commissioned': 'limited', 'Commissioned because': 'P1 is a constant'}
+    voices.flag(valve, FaultFlag.STATE_HEALTHY, 'LC74_20')
+    voices.diagnose(valve, tag='LV-7', **told, **{'Partial strokes': 'not allowed'})
+    page = browser.new_page()
+    page.goto(f'{site.address}/valve/{valve}')
+    page.wait_for_selector('.commission[data-verdict=limited] >> text=P1 is a constant')
+    page.wait_for_selector('h1 >> text=LV-7')
+    page.get_by_role('button', name='Actions').click()
+    page.wait_for_selector('.q-item.disabled >> text=allow_partial_stroke')
+    limit = {'Partial strokes': 'allowed', 'Partial stroke limit (%)': '4'}
+    voices.diagnose(valve, tag='LV-7', **told, **limit)
+    page.wait_for_function("!document.querySelector('.q-item.disabled')")
+    page.get_by_text('Partial strokes', exact=True).click()
+    page.get_by_label('To each side').fill('3')
+    page.get_by_label('Number of strokes').fill('2')
+    page.get_by_label('Your name').fill('Anna')
+    page.get_by_label('Comment').fill('monthly check')
+    page.get_by_role('button', name='Ask for the strokes').click()
+    page.wait_for_selector('.q-notification >> text=the driver was asked')
+    assert asked == [(0.03, 2, 'Anna', 'monthly check')]
+    voices.diagnose(valve, tag='LV-7', **told, **{**limit, 'Partial strokes': 'under way'})
+    page.get_by_role('button', name='Actions').click()
+    page.get_by_text('End the partial strokes').click()
+    page.wait_for_function("document.querySelectorAll('.q-notification').length > 1")
+    assert asked[1][:2] == (0.0, 0)
+    page.close()
+
+
 @pytest.mark.parametrize('scheme', ['light', 'dark'])
 def test_axe_finds_nothing_serious_on_any_page(site, hostile, browser, scheme):
     page = browser.new_page(color_scheme=scheme)
@@ -202,6 +244,15 @@ def test_german_is_complete_on_the_page(site, browser):
     page.wait_for_selector('text=Die Reibung beträgt das 2,6-Fache des Normalen.')
     assert page.get_by_role('button', name='Alarm von mute quittieren').is_visible()
     page.wait_for_function("document.documentElement.lang === 'de'")
+    english = set(texts('en').entries.values()) - set(texts('de').entries.values())
+    long = sorted(text for text in english if ' ' in text and '{' not in text)
+    page.set_viewport_size({'width': 390, 'height': 844})
+    for address in ('/valve/mute', '/', '/history', '/replay', '/valve/none'):
+        page.goto(site.address + address)
+        page.wait_for_function("document.body.dataset.link === 'good'")
+        shown = page.locator('body').inner_text()
+        assert [text for text in long if text in shown] == [], address
+        assert page.evaluate('document.documentElement.scrollWidth') <= 390, address
     context.close()
 
 

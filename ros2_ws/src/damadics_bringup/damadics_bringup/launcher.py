@@ -77,6 +77,17 @@ def signatures(valves: Sequence[Valve]) -> list[str]:
     return [folder for folder in dict.fromkeys(stated) if folder != 'auto']
 
 
+def causes(valves: Sequence[Valve]) -> list[str]:
+    """
+    Return the file of edited texts that the valves of a fleet file share, for the page.
+
+    :param valves: of the fleet.
+    :return: its path; nothing where there is none, or more than one.
+    """
+    stated = {str(valve.settings.get('causes_file') or '') for valve in valves} - {''}
+    return list(stated) if len(stated) == 1 else []
+
+
 def tasks_of(valves: list[Valve], options: argparse.Namespace) -> list[Task]:
     """
     List what has to run.
@@ -119,6 +130,7 @@ def tasks_of(valves: list[Valve], options: argparse.Namespace) -> list[Task]:
                 + (['--show'] if options.show else [])
                 + (['--token-file', str(options.token_file)] if options.token_file else [])
                 + [word for folder in signatures(valves) for word in ('--signatures', folder)]
+                + [word for file in causes(valves) for word in ('--causes', file)]
                 + arguments_of({}, enclave='/dashboard'),
             )
         )

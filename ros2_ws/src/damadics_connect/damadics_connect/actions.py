@@ -1,6 +1,6 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Do what a person outside ROS 2 asks for: acknowledge, reset, shelve."""
+"""Do what a person outside ROS 2 asks for: acknowledge, reset, shelve, partial strokes."""
 
 import asyncio
 from typing import NamedTuple
@@ -11,6 +11,7 @@ from damadics_msgs.srv import (
     FleetAcknowledge,
     FleetReset,
     FleetShelve,
+    PartialStroke,
     ResetAlarm,
     Shelve,
 )
@@ -23,6 +24,7 @@ KINDS = {
     'acknowledge': (Acknowledge, FleetAcknowledge),
     'reset': (ResetAlarm, FleetReset),
     'shelve': (Shelve, FleetShelve),
+    'partial_stroke': (PartialStroke, None),  # only a detector of its own follows the stem
 }
 PATIENCE = 5.0  # s for an answer
 LONGEST_SHELF = 30 * 86_400.0  # s
@@ -57,6 +59,8 @@ class Actions:
         *,
         occurrence: int = 0,
         duration: float = 0.0,
+        amplitude: float = 0.0,
+        count: int = 0,
     ) -> Answer:
         """
         Have something done to a valve's alarm.
@@ -67,11 +71,15 @@ class Actions:
         :param comment: why.
         :param occurrence: number of the alarm to acknowledge, 0: the present one.
         :param duration: of a shelf [s], 0: end it.
+        :param amplitude: of partial strokes, to each side, share of full travel.
+        :param count: of partial strokes, 0: end them.
         :return: what was done, or why not.
         """
         single, fleet = KINDS[action]
         own = topic_of(valve, action)
-        name, kind = (own, single) if own in self._watch.services else (f'/fleet/{action}', fleet)
+        name, kind = own, single
+        if own not in self._watch.services and fleet is not None:
+            name, kind = f'/fleet/{action}', fleet
         if name not in self._watch.services:
             return Answer(False, f'nobody serves {own}: is the detector running?')
         request = kind.Request(user=plain(user, NAME), comment=plain(comment, COMMENT))
@@ -81,6 +89,8 @@ class Actions:
             request.occurrence = occurrence
         elif action == 'shelve':
             request.duration = min(max(duration, 0.0), LONGEST_SHELF)
+        elif action == 'partial_stroke':
+            request.amplitude, request.count = amplitude, count
         if name not in self._clients:
             self._clients[name] = self._node.create_client(kind, name)
         client = self._clients[name]

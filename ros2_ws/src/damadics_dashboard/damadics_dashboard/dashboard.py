@@ -11,11 +11,13 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
 
+from damadics_fd.causes import CauseTableError
 from damadics_fd.ros.arguments import command_parser, split_ros_args, state_folder
 from damadics_fd.store.access import Access, AccessError, parse_access, read_access
 from damadics_fd.store.alarms import default_folder
 
 from damadics_dashboard.server.access import Guard, check_binding
+from damadics_dashboard.words.texts import use_causes
 
 if TYPE_CHECKING:
     from damadics_dashboard.live.watcher import Watcher
@@ -71,6 +73,12 @@ def parser() -> argparse.ArgumentParser:
         help='signature_folder of detectors, beside "auto": the trends that they kept while there '
         'was no page are taken over; again for more',
     )
+    p.add_argument(
+        '--causes',
+        type=Path,
+        metavar='FILE',
+        help='causes.yaml with your own texts and advice, as causes_file of the detectors',
+    )
     p.add_argument('--show', action='store_true', help='open the page in a browser')
     return p
 
@@ -109,16 +117,17 @@ def main(args: list[str] | None = None) -> int:
     try:
         access = read_tokens(options.token_file)
         check_binding(options.host, access)
+        use_causes(options.causes)
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         return serve(options, access, ros_args)
     except KeyboardInterrupt:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         return 0  # the server repeats the signal after its clean end
-    except AccessError as problem:
+    except (AccessError, CauseTableError) as problem:
         print(f'dashboard: {problem}', file=sys.stderr)
         return 2
     except OSError as problem:
-        print(f'dashboard: {problem}; give another --port or --state', file=sys.stderr)
+        print(f'dashboard: {problem}; give another --port, --state or --causes', file=sys.stderr)
         return 2
 
 

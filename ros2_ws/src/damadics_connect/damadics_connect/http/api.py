@@ -43,6 +43,13 @@ class ShelveBody(Body):
     duration: float = Field(..., ge=0.0, le=LONGEST_SHELF, description='[s]; 0: end it now')
 
 
+class PartialStrokeBody(Body):
+    """How many strokes, and how large."""
+
+    amplitude: float = Field(0.0, ge=0.0, le=1.0, description='to each side, share of full travel')
+    count: int = Field(..., ge=0, lt=2**32, description='number of strokes; 0: end them now')
+
+
 def application(watch: Watch, actions: Actions, stream: Stream, guard: Guard) -> FastAPI:
     """
     Make the application.
@@ -129,15 +136,12 @@ def application(watch: Watch, actions: Actions, stream: Stream, guard: Guard) ->
         valve: str,
         grant: Grant,
         body: Body,
-        occurrence: int = 0,
-        duration: float = 0.0,
+        **values: int | float,
     ) -> Response:
         if valve not in watch.valves:
             raise HTTPException(404, 'there is no such valve: see /api/fleet')
         user = grant.name or body.user or grant.role
-        answer = await actions.do(
-            action, valve, user, body.comment, occurrence=occurrence, duration=duration
-        )
+        answer = await actions.do(action, valve, user, body.comment, **values)
         return JSONResponse(
             {'done': answer.done, 'text': answer.text}, 200 if answer.done else 409
         )
@@ -145,7 +149,7 @@ def application(watch: Watch, actions: Actions, stream: Stream, guard: Guard) ->
     @app.post('/api/acknowledge/{valve:path}')
     async def acknowledge(valve: str, body: AcknowledgeBody, grant: operator) -> Response:
         """Note that a person has seen the alarm."""
-        return await done('acknowledge', valve, grant, body, body.occurrence)
+        return await done('acknowledge', valve, grant, body, occurrence=body.occurrence)
 
     @app.post('/api/reset/{valve:path}')
     async def reset(valve: str, body: Body, grant: operator) -> Response:
@@ -155,7 +159,13 @@ def application(watch: Watch, actions: Actions, stream: Stream, guard: Guard) ->
     @app.post('/api/shelve/{valve:path}')
     async def shelve(valve: str, body: ShelveBody, grant: operator) -> Response:
         """Mask the alarms of a valve for a time."""
-        return await done('shelve', valve, grant, body, 0, body.duration)
+        return await done('shelve', valve, grant, body, duration=body.duration)
+
+    @app.post('/api/partial_stroke/{valve:path}')
+    async def partial_stroke(valve: str, body: PartialStrokeBody, grant: operator) -> Response:
+        """Ask the driver of a valve for small strokes, where its detector allows them."""
+        asked = {'amplitude': body.amplitude, 'count': body.count}
+        return await done('partial_stroke', valve, grant, body, **asked)
 
     @app.get('/metrics', dependencies=[viewer])
     def metrics() -> Response:

@@ -33,7 +33,7 @@ class _Valve:
         self.motion = Motion()
         self.seen = -1  # ns, stamp of the last position that was looked at
         self.signature: Signature | None = None
-        self.caught_up = False  # with what the detector has kept
+        self.caught_up = ''  # tag under which the detector has kept what was taken over
 
 
 class TrendPoints:
@@ -61,9 +61,9 @@ class TrendPoints:
         :param valve: the valve.
         """
         mine = self._valves[valve.name]
-        if valve.tag and not mine.caught_up:
+        if valve.tag != mine.caught_up:
             self._catch_up(valve.name, valve.tag)
-            mine.caught_up = True
+            mine.caught_up = valve.tag
         signature = valve.signature
         if signature is not None and signature is not mine.signature:
             mine.signature = signature

@@ -74,6 +74,7 @@ class Valve:
     def __init__(self, name: str, simulated: bool = False) -> None:
         self.name = name
         self.tag = ''
+        self._configured = False  # the tag is the one that its nodes were given
         self.flag: FaultFlag | None = None
         self.flag_at = -1e9
         self.threshold_at = -1e9
@@ -148,13 +149,22 @@ class Valve:
         """
         if flag.threshold > 0.0:
             self.peak = max(self.peak, flag.residual / flag.threshold)
-        if flag.header.frame_id:
+        if flag.header.frame_id and not self._configured:
             self.tag = plain(flag.header.frame_id, NAME)
         self.flag, self.flag_at = flag, now
         stamp = flag.header.stamp.sec * NANO + flag.header.stamp.nanosec
         if self.threshold_at < 0.0 and stamp != self.judged:
             self.freshness.heard(stamp, now)
         self.judged = stamp
+
+    def take_tag(self, tag: str) -> None:
+        """
+        Take the tag that the nodes of the valve were given; it counts more than a driver's.
+
+        :param tag: of the actuator; the name that nodes have without one is left out.
+        """
+        if tag not in ('', 'actuator'):
+            self.tag, self._configured = plain(tag, NAME), True
 
     def take_event(self, event: EventRow) -> None:
         """

@@ -34,7 +34,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.subscription import Subscription
 
 from damadics_dashboard.live.calls import Calls, Field, Service, ServiceError
-from damadics_dashboard.live.fleet import FleetReport, shared
+from damadics_dashboard.live.fleet import SERVICES, FleetReport, shared
 from damadics_dashboard.live.record import action_row, event_row
 from damadics_dashboard.live.trend_points import TrendPoints
 from damadics_dashboard.live.valve import Valve
@@ -71,6 +71,9 @@ class Watcher:
         self.valves: dict[str, Valve] = {}
         for name in history.valves():
             self._valve(name)
+        self._tags = history.tags()
+        for name, tag in self._tags.items():
+            self._valve(name).tag = tag
         for event in reversed(history.latest(count=1000)):
             self.valves[event['valve']].take_event(event)
         self._follow = follow
@@ -178,7 +181,7 @@ class Watcher:
         """
         name = _topic(valve, service)
         known = self.valves.get(valve)
-        if name not in self.services and known is not None and known.fleet:
+        if name not in self.services and known and known.fleet and service in SERVICES:
             name, kind, more = shared(known.fleet, service)
             request = {**request, **more}
         if name not in self.services:
@@ -220,6 +223,9 @@ class Watcher:
             for valve in tuple(self.valves.values()):
                 valve.second()
                 self.trends.take(valve)
+                if valve.tag and self._tags.get(valve.name) != valve.tag:
+                    self._tags[valve.name] = valve.tag
+                    self.history.keep_tag(valve.name, valve.tag)
             self.trends.keep(now)
             self.history.retry()
         self._calls.carry_out(self._node)
@@ -331,6 +337,7 @@ class Watcher:
                 valve.diagnostics[kind] = {v.key: v.value for v in status.values}
                 valve.diagnostics[kind]['Message'] = status.message
                 valve.levels[kind] = status.level[0]
+                valve.take_tag(status.hardware_id)
 
 
 def _topic(valve: str, name: str) -> str:

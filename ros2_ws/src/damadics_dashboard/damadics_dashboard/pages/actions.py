@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What an operator can do to a valve: buttons that call its services, and who pressed them."""
 
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
+from typing import TypeAlias
 
 from damadics_fd.core.text import COMMENT, NAME, plain
 from damadics_msgs.srv import Acknowledge, Reference, Relearn, ResetAlarm, Shelve
@@ -17,6 +18,7 @@ from damadics_dashboard.words.texts import Texts
 
 SHELVES = (600.0, 3600.0, 8 * 3600.0, 86400.0)
 Act = Callable[..., Awaitable[bool]]
+Asked: TypeAlias = ui.select | ui.number
 
 
 async def call(
@@ -62,27 +64,27 @@ class Dialog:
 
     :param t: the words.
     :param key: of the texts: `key`, `key_explained`, `key_do`.
-    :param act: what is done; takes user, comment and, where asked for, duration.
-    :param durations: choices of how long [s].
+    :param act: what is done; takes user, comment and what else is asked for.
+    :param ask: draws what else is asked for; returns the fields by the name that `act` takes.
     """
 
-    def __init__(self, t: Texts, key: str, act: Act, durations: tuple[float, ...] = ()) -> None:
+    def __init__(
+        self, t: Texts, key: str, act: Act, ask: Callable[[], Mapping[str, Asked]] = dict
+    ) -> None:
         self._act = act
-        with ui.dialog() as self._dialog, ui.card().classes('w-96 ask') as card:
+        with ui.dialog() as self._dialog, ui.card().classes('ask') as card:
             with_values(card, role='dialog', aria_label=t(key))
             ui.label(t(key)).classes('ask-title')
             ui.label(t(f'{key}_explained')).classes('sub')
-            self._duration = None
-            if durations:
-                choices = {seconds: t.duration(seconds) for seconds in durations}
-                self._duration = ui.select(choices, value=durations[0], label=t('for_time'))
-                self._duration.classes('w-full')
+            self._asked = ask()
+            for field in self._asked.values():
+                field.classes('w-full')
             self._user = ui.input(t('your_name'), value=user_name()).classes('w-full')
             with_values(self._user, maxlength=NAME)
             self._user.set_enabled(not grant().name)
             self._comment = ui.input(t('comment')).classes('w-full')
             with_values(self._comment, maxlength=COMMENT)
-            with ui.row().classes('w-full justify-end'):
+            with box('div', 'choice'):
                 button(t('cancel'), self._dialog.close)
                 button(t(f'{key}_do'), self._done, 'main')
         self._dialog.open()
@@ -90,14 +92,18 @@ class Dialog:
     async def _done(self) -> None:
         self._dialog.close()
         keep_user(plain(self._user.value or '', NAME))
-        given: dict[str, str | float] = {
-            'user': plain(self._user.value or '', NAME),
-            'comment': plain(self._comment.value or '', COMMENT),
-        }
-        if self._duration is not None:
-            given['duration'] = self._duration.value
-        await self._act(**given)
+        await self._act(
+            user=plain(self._user.value or '', NAME),
+            comment=plain(self._comment.value or '', COMMENT),
+            **{name: field.value for name, field in self._asked.items()},
+        )
         self._dialog.delete()
+
+
+def _for_time(t: Texts) -> dict[str, Asked]:
+    """Ask for how long to shelve."""
+    choices = {seconds: t.duration(seconds) for seconds in SHELVES}
+    return {'duration': ui.select(choices, value=SHELVES[0], label=t('for_time'))}
 
 
 def _caller(watcher: Watcher, name: str, service: str, kind: Service, **fixed: Field) -> Act:
@@ -140,19 +146,20 @@ def alarm_buttons(watcher: Watcher, valve: Valve, occurrence: int, t: Texts) -> 
         )
         button(
             t('shelve'),
-            lambda: Dialog(t, 'shelve', shelve, SHELVES),
+            lambda: Dialog(t, 'shelve', shelve, lambda: _for_time(t)),
             label=t('shelve_of', valve=valve.title),
         )
     return first
 
 
-def valve_buttons(watcher: Watcher, valve: Valve, t: Texts) -> None:
+def valve_buttons(watcher: Watcher, valve: Valve, t: Texts) -> ui.menu:
     """
     Draw what can be done to a valve at any time.
 
     :param watcher: the ROS side.
     :param valve: the valve.
     :param t: the words.
+    :return: the menu, for what else can be done.
     """
     name = valve.name
     shelve = _caller(watcher, name, 'shelve', Shelve)
@@ -162,7 +169,7 @@ def valve_buttons(watcher: Watcher, valve: Valve, t: Texts) -> None:
     choices: tuple[tuple[str, Callable[[], object]], ...] = (
         ('acknowledge', lambda: Dialog(t, 'acknowledge', acknowledge)),
         ('reset', lambda: Dialog(t, 'reset', reset)),
-        ('shelve', lambda: Dialog(t, 'shelve', shelve, SHELVES)),
+        ('shelve', lambda: Dialog(t, 'shelve', shelve, lambda: _for_time(t))),
         ('end_shelf', _caller(watcher, name, 'shelve', Shelve, duration=0.0)),
         ('relearn', lambda: Dialog(t, 'relearn', relearn)),
         ('save_reference', _caller(watcher, name, 'save_reference', Reference)),
@@ -170,6 +177,7 @@ def valve_buttons(watcher: Watcher, valve: Valve, t: Texts) -> None:
     )
     with button(t('actions'), lambda: None) as opener:
         opener.props('icon-right=expand_more')
-        with ui.menu():
+        with ui.menu() as menu:
             for key, act in choices:
                 ui.menu_item(t(key), on_click=act)
+    return menu

@@ -146,7 +146,8 @@ def tile(valve: Valve, t: Texts, now: float, clock: int) -> Tile:
     ratio = valve.ratio
     if valve.flag is not None and valve.flag.threshold > 0.0:
         ratio = max(ratio, valve.flag.residual / valve.flag.threshold)
-    learning = condition.kind == 'learn'
+    learning, monitored = condition.kind == 'learn', condition.kind != 'off'
+    ratio = ratio if monitored else 0.0  # of a time that is over
     state = t(condition.title)
     return {
         'kind': condition.kind,
@@ -156,7 +157,11 @@ def tile(valve: Valve, t: Texts, now: float, clock: int) -> Tile:
         'badge': badge,
         'hot': hot,
         'why': why,
-        'ratio': t.percent(valve.progress) if learning else of_limit(ratio, t),
+        'ratio': t.percent(valve.progress)
+        if learning
+        else of_limit(ratio, t)
+        if monitored
+        else '',
         'share': round(min(ratio, 2.0), 2),
         'progress': round(valve.progress, 3) if learning else -1,
         'fresh': t('last_sample'),

@@ -5,6 +5,7 @@
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import yaml
@@ -34,6 +35,14 @@ MOST_POINTS = 4000  # of the signature
 Given = dict[str, Value]  # settings by name, as a parameter file has them
 
 
+class Truth(NamedTuple):
+    """Which fault was simulated: the number is 0 for none."""
+
+    fault: int
+    start: float = math.nan  # s
+    delay: float = math.nan  # s, until it was flagged; NaN: it was not
+
+
 @dataclass
 class Playback:
     """What became of one recording, with what the plots show."""
@@ -46,7 +55,7 @@ class Playback:
     curves: dict[str, Points] = field(default_factory=dict)
     signature: list[Points] = field(default_factory=list)  # before and since the first alarm
     range: tuple[float, float] = (0.0, 1.0)  # s
-    truth: str = ''
+    truth: Truth | None = None  # where the recording tells it
     monitored: bool = False  # whether it ever judged
 
     @property
@@ -163,8 +172,8 @@ def _draw(done: Playback, columns: dict[str, np.ndarray], result: Result, width:
     order = np.argsort(stamp, kind='stable')
     stamp = stamp[order]
     signals = {
-        'cv': columns['cv'],
-        'x1': columns['x1'],
+        'cv': columns['cv'] * 100.0,
+        'x1': columns['x1'] * 100.0,
         'x2': result.estimates['x2'],
         'residual': np.maximum(result.decisions['residual'], SMALLEST),
         'threshold': np.maximum(result.decisions['threshold'], SMALLEST),
@@ -186,17 +195,14 @@ def _draw(done: Playback, columns: dict[str, np.ndarray], result: Result, width:
     ]
 
 
-def _truth(recording: Recording, done: Playback) -> str:
-    """Say which fault was simulated, where the recording tells."""
+def _truth(recording: Recording, done: Playback) -> Truth | None:
+    """Return which fault was simulated, where the recording tells."""
     truth = recording.truth(lambda problem: None)
     if truth is None or not len(truth['fault']):
-        return ''
+        return None
     here = np.flatnonzero(truth['fault'])
     if not len(here):
-        return 'no fault was simulated'
+        return Truth(0)
     start = int(truth['stamp'][here[0]])
-    text = f'fault f{int(truth["fault"][here[0]])} was simulated from {start / NANO:.2f} s'
-    after = [alarm for alarm in done.alarms if alarm.stamp >= start]
-    return text + (
-        f', flagged {(after[0].stamp - start) / NANO:.2f} s later' if after else ', not flagged'
-    )
+    after = [(alarm.stamp - start) / NANO for alarm in done.alarms if alarm.stamp >= start]
+    return Truth(int(truth['fault'][here[0]]), start / NANO, after[0] if after else math.nan)

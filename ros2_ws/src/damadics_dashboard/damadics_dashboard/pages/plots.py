@@ -68,7 +68,7 @@ def time_plot(
     :param low: lower end of the ordinate, free if None.
     :param high: upper end.
     :param dashed: curves drawn dashed.
-    :param bands: curves drawn thin, as the edges of a band.
+    :param bands: curves drawn thin, as the edges of a band; the legend leaves them out.
     :return: ECharts options.
     """
     axis: Saved = {
@@ -87,8 +87,15 @@ def time_plot(
             axis['interval'] = (high - low) / 4.0
     return {
         'animation': False,
-        'grid': {'left': 54, 'right': 18, 'top': 34, 'bottom': 40},
-        'legend': {'top': 0, 'right': 6, 'itemWidth': 16, 'itemHeight': 8, 'icon': 'roundRect'},
+        'grid': {'left': 54, 'right': 30, 'top': 34, 'bottom': 40},
+        'legend': {
+            'top': 0,
+            'right': 6,
+            'itemWidth': 16,
+            'itemHeight': 8,
+            'icon': 'roundRect',
+            'data': list(dict.fromkeys(name for name in names if name not in bands)),
+        },
         'tooltip': {
             'trigger': 'axis',
             'axisPointer': {'type': 'line', 'label': {'show': True}},
@@ -111,7 +118,7 @@ def time_plot(
             'nameLocation': 'end',
             'nameTextStyle': {'align': 'right', 'verticalAlign': 'top', 'padding': [18, 0, 0, 0]},
             'nameGap': 0,
-            'axisLabel': {'showMinLabel': False, 'showMaxLabel': False},
+            'axisLine': {'onZero': False},
             'splitLine': {'show': False},
         },
         'yAxis': {**axis, 'axisPointer': {'show': False}},
@@ -126,6 +133,7 @@ def time_plot(
                     'width': 1.0 if name in bands else 1.8,
                     'opacity': 0.5 if name in bands else 1.0,
                     'type': 'dashed' if name in dashed else 'solid',
+                    'cap': 'butt' if name in dashed else 'round',
                 },
             }
             for name in names
@@ -144,7 +152,7 @@ def signature_plot(names: tuple[str, ...], x: str, y: str) -> Options:
     """
     return {
         'animation': False,
-        'grid': {'left': 54, 'right': 16, 'top': 34, 'bottom': 40},
+        'grid': {'left': 54, 'right': 16, 'top': 50, 'bottom': 40},
         'legend': {'top': 0, 'right': 6, 'itemWidth': 10, 'itemHeight': 10, 'icon': 'circle'},
         'tooltip': {'trigger': 'item', 'confine': True},
         'xAxis': {

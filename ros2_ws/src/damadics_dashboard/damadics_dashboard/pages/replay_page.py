@@ -3,6 +3,7 @@
 """The page for recordings: drop one, see what the detector makes of it."""
 
 import logging
+import math
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -21,7 +22,7 @@ from damadics_dashboard.words.texts import Texts
 from damadics_dashboard.words.valve_words import cause_of, history_rows
 
 if TYPE_CHECKING:
-    from damadics_dashboard.pages.playback import Given, Playback
+    from damadics_dashboard.pages.playback import Given, Playback, Truth
 
 MODES = ('monitor', 'paper', 'scada')
 MOST_SHOWN = 20  # recordings of one file
@@ -143,6 +144,24 @@ async def _replayed(
             return said or t('damaged_recording')
 
 
+def truth_words(truth: 'Truth | None', t: Texts) -> str:
+    """
+    Say which fault was simulated, and when it was flagged.
+
+    :param truth: of a recording; None where it does not tell.
+    :param t: the words.
+    :return: text.
+    """
+    if truth is None:
+        return ''
+    if not truth.fault:
+        return t('truth_none')
+    told = t('truth_fault', fault=truth.fault, start=t.local(f'{truth.start:.2f}'))
+    if math.isnan(truth.delay):
+        return f'{told}, {t("truth_missed")}'
+    return f'{told}, {t("truth_flagged", delay=t.local(f"{truth.delay:.2f}"))}'
+
+
 def _show(done: 'Playback', mode: str, t: Texts) -> None:
     """Draw the verdict and the plots of one recording."""
     alarms = done.alarms
@@ -160,7 +179,7 @@ def _show(done: 'Playback', mode: str, t: Texts) -> None:
         f'{t("mode")} {mode}',
         t('sample_count', number=done.samples),
         t.duration(done.duration),
-        done.truth,
+        truth_words(done.truth, t),
         t('suspected', cause=cause.words()[0]) if cause is not None and alarms else '',
     )
     left_out = [t('left_out', what=plain(p, COMMENT)) for p in done.problems[:5]]
@@ -187,7 +206,7 @@ def _show(done: 'Playback', mode: str, t: Texts) -> None:
             plot(
                 'position_title',
                 {cv: ('cv', '--cv'), x1: ('x1', '--x1')},
-                time_plot([cv, x1], '1', low=0.0, high=1.0, dashed=(cv,)),
+                time_plot([cv, x1], '%', low=0.0, high=100.0, dashed=(cv,)),
             )
             judged = plot(
                 'residual_title',

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from damadics_fd.ros.arguments import command_parser, split_ros_args, state_folder
 from damadics_fd.store.file_names import file_name
 
-from damadics_dashboard.words.texts import LANGUAGES, Texts, texts
+from damadics_dashboard.words.texts import LANGUAGES, Texts, texts, use_causes
 
 if TYPE_CHECKING:
     from damadics_dashboard.report.content import Report
@@ -40,6 +40,12 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument('--out', type=Path, default=Path(), metavar='DIR', help='folder (here)')
     p.add_argument('--as', dest='forms', nargs='+', choices=FORMS, default=FORMS, help='(all)')
     p.add_argument('--language', choices=tuple(LANGUAGES), default='en', help='(en)')
+    p.add_argument(
+        '--causes',
+        type=Path,
+        metavar='FILE',
+        help='causes.yaml with your own texts and advice, as causes_file of the detectors',
+    )
     p.add_argument(
         '--state',
         type=Path,
@@ -109,6 +115,7 @@ def write(options: argparse.Namespace, since: float, until: float) -> list[Path]
     from damadics_dashboard.report import content, forms
     from damadics_dashboard.store.history import History
 
+    use_causes(options.causes)
     t = texts(options.language)
     history = History(options.state / 'history.sqlite')
     intervals = Intervals(options.state / 'trends.sqlite')
@@ -118,11 +125,15 @@ def write(options: argparse.Namespace, since: float, until: float) -> list[Path]
             report = content.fleet_report(sources, since, until, t)
         else:
             known = sources.valves()
-            if options.what not in known:
+            valve = options.what
+            if valve not in known:  # people may know the tag better
+                of_tag = {tag: name for name, tag in history.tags().items()}
+                valve = of_tag.get(valve, valve)
+            if valve not in known:
                 near = difflib.get_close_matches(options.what, known, 1)
                 hint = f'do you mean {near[0]}?' if near else f'known are {", ".join(known)}'
                 raise ValueError(f'nothing is known of {options.what}: {hint}')
-            report = content.valve_report(sources, options.what, since, until, t)
+            report = content.valve_report(sources, valve, since, until, t)
     finally:
         history.close()
         intervals.close()

@@ -67,6 +67,16 @@ class Sources:
         """
         return sorted({*self.history.valves(), *self.intervals.valves()})
 
+    def tag(self, valve: str) -> str:
+        """
+        Return the tag of a valve's actuator.
+
+        :param valve: name of the valve.
+        :return: tag, '' where it is not known or says no more than the name.
+        """
+        tag = self.history.tags().get(valve, '')
+        return '' if tag == valve else tag
+
 
 def alarms_of(events: list[EventRow]) -> list[Alarm]:
     """
@@ -152,11 +162,13 @@ def valve_report(sources: Sources, valve: str, since: float, until: float, t: Te
             [_action(row, t) for row in actions[:LISTED]],
         ),
     ]
+    tag = sources.tag(valve)
     return Report(
-        t('report_title', what=valve or 'valve'),
+        t('report_title', what=f'{valve or "valve"} {tag}'.strip()),
         _period(since, until, t),
         [
             (t('valve'), valve or 'valve'),
+            *([(t('tag'), tag)] if tag else []),
             (t('alarms'), str(len(alarms))),
             (t('mtbf'), t.duration(mtbf)),
             (t('mttr'), t.duration(mttr)),
@@ -192,7 +204,8 @@ def fleet_report(sources: Sources, since: float, until: float, t: Texts) -> Repo
         mtbf, mttr = reliability(mine, until - since)
         what = headline(mine[-1].last, t)[0] if mine else t('report_quiet')
         worst = max((a.level for a in mine), default=0)
-        row = [valve or 'valve', str(len(mine)), t.duration(mtbf), t.duration(mttr), what]
+        name = f'{valve or "valve"} {sources.tag(valve)}'.strip()
+        row = [name, str(len(mine)), t.duration(mtbf), t.duration(mttr), what]
         rows.append((worst, len(mine), row))
     rows.sort(key=lambda r: (-r[0], -r[1], r[2][0]))
     mtbf, mttr = reliability(alarms, until - since, max(len(valves), 1))

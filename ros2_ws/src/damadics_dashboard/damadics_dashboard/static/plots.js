@@ -76,7 +76,7 @@
     const { spec } = entry;
     const [ink, muted, line, card] = ['--ink', '--muted', '--line', '--card'].map(css);
     const look = {
-      axisLine: { lineStyle: { color: line } },
+      axisLine: { onZero: false, lineStyle: { color: line } },
       axisTick: { lineStyle: { color: line } },
       splitLine: { lineStyle: { color: line, opacity: 0.6 } },
       axisLabel: { color: muted, hideOverlap: true },

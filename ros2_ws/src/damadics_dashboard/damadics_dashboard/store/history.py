@@ -43,6 +43,7 @@ ACTION = {
     'done': 'INTEGER',
     'result': 'TEXT',
 }
+TAG = {'valve': 'TEXT', 'tag': 'TEXT'}
 COLUMNS, ACTION_COLUMNS = tuple(EVENT), tuple(ACTION)
 KINDS = {'TEXT': (str,), 'INTEGER': (int,), 'REAL': (int, float)}
 INDEXES = (
@@ -80,7 +81,9 @@ class History:
 
     def __init__(self, path: Path) -> None:
         self._lock = threading.Lock()
-        self._db, self.problem = open_database(path, {'event': EVENT, 'action': ACTION}, INDEXES)
+        self._db, self.problem = open_database(
+            path, {'event': EVENT, 'action': ACTION, 'tag': TAG}, INDEXES
+        )
         self._waiting: deque[tuple[str, EventRow | ActionRow]] = deque(maxlen=MOST_WAITING)
         # A detector repeats its last events to a newcomer, such as this page after its restart.
         self._known = Counter(
@@ -187,6 +190,30 @@ class History:
         with self._lock:
             rows = self._db.execute('SELECT DISTINCT valve FROM event').fetchall()
         return sorted(row[0] for row in rows)
+
+    def tags(self) -> dict[str, str]:
+        """
+        Return the actuators' tags that are known.
+
+        :return: tag by the name of the valve.
+        """
+        with self._lock:
+            rows = self._db.execute('SELECT valve, tag FROM tag').fetchall()
+        return {str(valve): str(tag) for valve, tag in rows}
+
+    def keep_tag(self, valve: str, tag: str) -> None:
+        """
+        Keep the tag of a valve, for reports that are written while nobody speaks.
+
+        :param valve: name of the valve.
+        :param tag: of its actuator.
+        """
+        try:
+            with self._lock, self._db:
+                self._db.execute('DELETE FROM tag WHERE valve = ?', (valve,))
+                self._db.execute('INSERT INTO tag VALUES (?, ?)', (valve, tag))
+        except sqlite3.Error as problem:
+            self.problem = f'not written, tried again every second: {problem}'
 
     def close(self) -> None:
         """Close the file."""

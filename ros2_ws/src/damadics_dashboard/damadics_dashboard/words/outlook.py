@@ -15,7 +15,7 @@ UNITS = {  # factor from what is stored, unit shown
     'preload': (1.0, 'N'),
     'friction': (100.0, '%'),
     'play': (100.0, '%'),
-    'travel': (1.0, 'strokes/h'),
+    'travel': (1.0, '1/h'),
     'reversals': (1.0, '1/h'),
     'cycles': (1.0, '1/h'),
     'unstroked': (1.0 / 86400.0, 'd'),

@@ -7,6 +7,7 @@ import time
 from collections.abc import Mapping
 from functools import cache
 from importlib import resources
+from pathlib import Path
 
 import yaml
 from damadics_fd.causes import CauseTable, load_causes
@@ -15,6 +16,7 @@ from damadics_fd.core.stamps import SECOND, is_date
 LANGUAGES = {'en': 'English', 'de': 'Deutsch'}
 DASH = '–'
 Word = str | float | int
+_edited: list[Path] = []  # the file of `use_causes`
 
 
 class Texts:
@@ -29,7 +31,7 @@ class Texts:
         content = resources.files('damadics_dashboard.words').joinpath(f'{language}.yaml')
         loaded: Mapping[str, str] = yaml.safe_load(content.read_text('utf-8'))
         self.entries = dict(loaded)
-        self.causes: CauseTable = load_causes(language=language)
+        self.causes: CauseTable = load_causes(_edited[-1] if _edited else None, language)
 
     def __call__(self, key: str, **values: Word) -> str:
         """
@@ -140,6 +142,20 @@ def texts(language: str) -> Texts:
     :return: the words.
     """
     return Texts(language if language in LANGUAGES else 'en')
+
+
+def use_causes(path: Path | None) -> None:
+    """
+    Take the texts of causes from a file that somebody has edited, as detectors do.
+
+    :param path: a `causes.yaml`; what it leaves out is as before. None: no such file.
+    :raises CauseTableError: listing everything that is wrong in it.
+    :raises OSError: where it cannot be read.
+    """
+    if path is not None:
+        load_causes(path)
+    _edited[:] = [path] if path is not None else []
+    texts.cache_clear()
 
 
 def preferred(accepted: str) -> str:

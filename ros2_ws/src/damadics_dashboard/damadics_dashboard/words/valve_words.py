@@ -115,7 +115,7 @@ def headline(event: EventRow, t: Texts) -> tuple[str, str, str]:
         )
     ratio = event.get('ratio')
     if ratio is not None and math.isfinite(ratio) and ratio >= 1.0:
-        return t('deviates', ratio=t.number(ratio, digits=2)), '', t('deviates_advice')
+        return t('deviates', size=of_limit(ratio, t)), '', t('deviates_advice')
     return t('deviates_some'), '', t('deviates_advice')
 
 
@@ -203,9 +203,6 @@ def _row(row: EventRow, t: Texts) -> dict[str, Cell]:
     what, numbers, advice = '', '', ''
     if transition in (FaultEvent.RAISED, FaultEvent.CHANGED):
         what, numbers, advice = headline(row, t)
-    told = plain(row['text'] or '', SENTENCE)
-    if what and told.endswith(']'):  # the words of the cause stand before the numbers
-        told = told[told.rfind('[') + 1 : -1]
     return {
         'moment': t.moment(row['stamp']),
         'valve': row['valve'] or 'valve',
@@ -214,8 +211,8 @@ def _row(row: EventRow, t: Texts) -> dict[str, Cell]:
         'what': t(TRANSITIONS[transition]) if transition in TRANSITIONS else '?',
         'occurrence': row['occurrence'] or '',
         'ratio': of_limit(row['ratio'], t),
-        'text': f'{what} {numbers}'.strip() or told,
-        'more': f'{advice} {told}'.strip() if what else '',
+        'text': f'{what} {numbers}'.strip() or plain(row['text'] or '', SENTENCE),
+        'more': advice,
     }
 
 

@@ -260,8 +260,9 @@ class DetectorNode(MonitoringNode):
     def report(self) -> Report:
         """Say what is judged."""
         decision = self._decision
+        more = self.commissioned | self._strokes.values
         if decision is None:
-            return Level.ERROR, 'no estimate has arrived', {}
+            return Level.ERROR, 'no estimate has arrived', more
         return report_of(
             decision,
             self._core,
@@ -271,6 +272,7 @@ class DetectorNode(MonitoringNode):
             twice=self._twice,
             rival=self._rival.problem,
             silent=self.watch.silent,
+            more=more,
         )
 
 

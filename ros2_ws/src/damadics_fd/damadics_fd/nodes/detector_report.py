@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a detector tells of itself in the diagnostics."""
 
+from collections.abc import Mapping
+
 from damadics_fd.core.decision.alarm import NE107, STATE_UNKNOWN
 from damadics_fd.core.decision.detector import Detector
 from damadics_fd.core.decision.events import Decision
@@ -22,6 +24,7 @@ def report_of(
     twice: int,
     rival: str,
     silent: bool,
+    more: Mapping[str, str],
 ) -> Report:
     """
     Say what is judged.
@@ -34,6 +37,7 @@ def report_of(
     :param twice: estimates that came a second time.
     :param rival: another detector judges the valve, '' if none does.
     :param silent: none comes any more.
+    :param more: further values.
     :return: level, one sentence, values by name: what is worst comes first.
     """
     statistics = core.statistics
@@ -51,6 +55,7 @@ def report_of(
         'NE 107': NE107[decision.level],
         **memory.values,
         **signature.values,
+        **more,
     }
     if memory.problem:
         return Level.ERROR, memory.problem, values

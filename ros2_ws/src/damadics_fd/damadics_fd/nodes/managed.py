@@ -11,6 +11,7 @@ from rclpy.parameter import Parameter
 
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.text import NAME, plain
+from damadics_fd.nodes.commissioned import commissioned
 from damadics_fd.nodes.input_watch import InputWatch
 from damadics_fd.ros import own_services
 from damadics_fd.ros.diagnostics import Diagnostics, Level, Report
@@ -76,7 +77,9 @@ class MonitoringNode(LifecycleNode, SpinnableNode, ABC):
         self.declare_more()
         self.settings: Settings = declare_settings(self.parameters)
         self.add_post_set_parameters_callback(self._apply)
-        for file in files_of(sys.argv if arguments is None else arguments):
+        files = files_of(sys.argv if arguments is None else arguments)
+        self.commissioned = commissioned(files)
+        for file in files:
             if silent := says_nothing(file, self.get_fully_qualified_name()):
                 self.get_logger().warning(silent)
 

@@ -23,6 +23,7 @@ from damadics_fd.ros.entities import Entities
 
 MOST_STROKES = 20  # of one request
 PATIENCE = 30.0  # s that a stroke may take
+ALLOWED, NOT_ALLOWED, UNDER_WAY = 'allowed', 'not allowed', 'under way'  # in the diagnostics
 SEEN = 0.5  # of the amplitude: a stem that goes so far to both sides has made a stroke
 
 
@@ -110,6 +111,16 @@ class PartialStrokes:
         if self._strokes is not None:
             self._send(0.0, 0)
             self._finish(False, f'partial strokes ended: {cause}')
+
+    @property
+    def values(self) -> dict[str, str]:
+        """Values for the diagnostics: whether people may ask for strokes, and how large ones."""
+        if not self._limits.allowed:
+            return {'Partial strokes': NOT_ALLOWED}
+        return {
+            'Partial strokes': UNDER_WAY if self._strokes else ALLOWED,
+            'Partial stroke limit (%)': f'{100.0 * self._limits.amplitude:g}',
+        }
 
     @property
     def _standing(self) -> bool:

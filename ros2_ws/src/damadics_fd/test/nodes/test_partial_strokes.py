@@ -100,3 +100,14 @@ def test_strokes_end_when(cause):
         bench.undo[-1]()
     assert bench.sent[-1] == (1, 0.0, 0)
     assert bench.ask(count=0).message == 'there are no partial strokes to end'
+
+
+def test_the_diagnostics_say_whether_strokes_may_be_asked_for():
+    assert Bench(allowed=False).strokes.values == {'Partial strokes': 'not allowed'}
+    bench = Bench()
+    assert bench.strokes.values == {'Partial strokes': 'allowed', 'Partial stroke limit (%)': '10'}
+    bench.see()
+    assert bench.ask().success
+    assert bench.strokes.values['Partial strokes'] == 'under way'
+    bench.strokes.end('the measurement is lost')
+    assert bench.strokes.values['Partial strokes'] == 'allowed'

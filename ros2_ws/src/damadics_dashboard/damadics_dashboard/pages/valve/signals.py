@@ -131,7 +131,7 @@ class Signals:
             columns = ('p1', 'p2', 'ps')
             self._pressures = self._plot(
                 [Curve(trace, column, scale=BAR) for column in columns],
-                time_plot([t(f'signal_{column}') for column in columns], 'bar'),
+                time_plot([t(f'signal_{column}').split(',')[0] for column in columns], 'bar'),
                 ['--cv', '--x1', '--velocity'],
                 t('process_label'),
             )

@@ -39,7 +39,7 @@ def simulator_panel(watcher: Watcher, valve: Valve, t: Texts) -> None:
             strength = ui.number(
                 t('strength'), value=1.0, min=-1.0, max=1.0, step=0.05, format='%.2f'
             )
-            strength.props('dense outlined').classes('w-28')
+            strength.props('dense outlined').classes('strength')
             choices = {s: t('over_time', time=t.duration(s)) for s in DEVELOPMENTS}
             choices[0.0] = t('abrupt')
             development = ui.select(choices, value=0.0, label=t('development'))

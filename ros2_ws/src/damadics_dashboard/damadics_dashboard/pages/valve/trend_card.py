@@ -69,14 +69,14 @@ class TrendCard:
         t, quantity = self._t, str(self._quantity.value)
         curves = [t('least'), t('mean'), t('greatest')]
         limits = t.causes.limits.get(quantity, ())
-        names = curves + [f'{t("limit")} {n + 1}' for n in range(len(limits))]
+        names = curves + [t('limit')] * len(limits)
         with self._plots:
             self._plot = Plot(
                 time_plot(
                     names,
                     unit_of(quantity),
                     bands=(curves[0], curves[2]),
-                    dashed=tuple(names[3:]),
+                    dashed=(t('limit'),),
                 ),
                 COLORS[: len(names)],
                 t('trend_label'),
@@ -92,7 +92,8 @@ class TrendCard:
         limits = self._t.causes.limits.get(quantity, ())
         factor = factor_of(quantity)
         series: list[Points] = [
-            _points(found, values * factor) for values in (found.least, found.mean, found.greatest)
+            points_of(found, values * factor)
+            for values in (found.least, found.mean, found.greatest)
         ]
         if len(found.start):
             span = [float(found.start[0]), float(found.start[-1])]
@@ -106,12 +107,22 @@ class TrendCard:
         self._words.set_text(words)  # without a trend the plot itself says so
 
 
-def _points(found: Series, values: np.ndarray) -> Points:
+def points_of(found: Series, values: np.ndarray) -> Points:
+    """
+    Return a trend as a curve that is broken where nothing is known.
+
+    :param found: the trend.
+    :param values: of each of its intervals.
+    :return: points (time [s], value).
+    """
     points: Points = []
     before = -np.inf
     for start, value in zip(found.start.tolist(), values.tolist(), strict=True):
-        if start - before > 4.0 * found.length and points:
-            points.append([before + found.length, None])
-        points.append([start + 0.5 * found.length, float(f'{value:.5g}')])
+        shown = float(f'{value:.5g}')
+        if start - before > 4.0 * found.length:
+            if points:
+                points.append([before + found.length, None])
+            points.append([start, shown])  # a point that stands alone is seen as a dash
+        points.append([start + 0.5 * found.length, shown])
         before = start
     return points

@@ -18,10 +18,12 @@ from damadics_dashboard.pages.elements import box, markup, redraw, tell, with_va
 from damadics_dashboard.pages.frame import card, frame, may_operate
 from damadics_dashboard.pages.plots import Area, Feed, signature
 from damadics_dashboard.pages.report_button import report_button
+from damadics_dashboard.pages.valve.partial_stroke import StrokeItem
 from damadics_dashboard.pages.valve.signals import Signals
 from damadics_dashboard.pages.valve.simulator import simulator_panel
 from damadics_dashboard.pages.valve.trend_card import TrendCard
-from damadics_dashboard.words.texts import Texts
+from damadics_dashboard.words.commission import commission_words
+from damadics_dashboard.words.texts import DASH, Texts
 from damadics_dashboard.words.valve_words import (
     detail_of,
     headline,
@@ -97,6 +99,8 @@ class _Page:
         self._head(window)
         self._banner = markup('banner.html', kind='off', title='', detail='', figures=[])
         self._banner.classes('w-full')
+        self._commission = markup('commission.html', words=commission_words({}, t))
+        self._commission.classes('w-full')
         self._alarm_box = box('div', 'w-full', id='alarms')
         with self._alarm_box, card(t('alarms'), classes='w-full'):
             self._alarms = AlarmList(watcher, lambda: (valve,), t, name=False)
@@ -132,8 +136,10 @@ class _Page:
             whole.classes('quiet whole').on('click', js_handler='() => damadics.whole()')
             with_values(whole, aria_label=t('whole'), title=t('whole'))
             report_button(valve.name, t)
+            self._strokes: StrokeItem | None = None
             if may_operate():
-                valve_buttons(self._watcher, valve, t)
+                with valve_buttons(self._watcher, valve, t):
+                    self._strokes = StrokeItem(self._watcher, valve, t)
 
     def _show(self, window: float) -> None:
         self._feed.window = float(window)
@@ -167,13 +173,16 @@ class _Page:
 
     def _slow(self) -> None:
         now, clock = time.monotonic(), self._watcher.clock
-        self._watcher.want(self._valve.name)
-        condition = self._valve.condition(now, clock)
+        valve = self._valve
+        self._watcher.want(valve.name)
+        condition = valve.condition(now, clock)
         redraw(self._banner, 'banner.html', **self._banner_values(condition, now, clock))
-        old = self._valve.age(now, clock)
+        old = valve.age(now, clock)
         tell('age', None if old is None else round(old, 1))
         stale = condition.kind == 'off'
         self._grid.classes(add='stale' if stale else '', remove='' if stale else 'stale')
+        bare = all(trace.newest < 0 for trace in valve.traces.values())
+        self._grid.classes(add='bare' if bare else '', remove='' if bare else 'bare')
         self._alarm_box.set_visibility(self._alarms.update() > 0)
         if self._watcher.offers(self._valve.name, 'inject_fault') != self._simulated:
             self._simulated = not self._simulated
@@ -186,6 +195,10 @@ class _Page:
             self._draw_history()
             self._signals.show_values()
             self._trends.update()
+            told = valve.diagnostics.get('detector', {})
+            redraw(self._commission, 'commission.html', words=commission_words(told, self._t))
+            if self._strokes is not None:
+                self._strokes.update()
             if not self._paused:
                 self._draw_signature()
 
@@ -196,7 +209,7 @@ class _Page:
         if alarm is not None:
             what, _, _ = headline(alarm.evidence, t)
             told = t('alarm_is', what=t('state_lost') if alarm.state == 'unknown' else what)
-        ratio = max(valve.ratio, 0.0)
+        ratio, monitored = max(valve.ratio, 0.0), condition.kind != 'off'
         rate = f'{1.0 / valve.period:.0f}' if valve.period > 0.0 else '–'
         return {
             'kind': condition.kind,
@@ -204,7 +217,11 @@ class _Page:
             'detail': detail_of(condition, t),
             'alarm': told,
             'figures': [
-                _figure(t('residual'), of_limit(ratio, t), share=ratio),
+                _figure(
+                    t('residual'),
+                    of_limit(ratio, t) if monitored else DASH,
+                    share=ratio if monitored else None,
+                ),
                 _figure(t('last_sample'), '–', t('ago'), aging=True),
                 _figure(t('samples'), rate, 'Hz'),
                 _figure(t('learned'), t.percent(valve.progress)),

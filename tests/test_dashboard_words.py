@@ -1,0 +1,148 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""What the page says of commissioning, tags, residuals and trends, without a browser."""
+
+import math
+
+import numpy as np
+import pytest
+from alarm_events import event
+from damadics_dashboard.dashboard import main as dashboard
+from damadics_dashboard.live.trend_points import TrendPoints
+from damadics_dashboard.live.valve import Valve
+from damadics_dashboard.pages.fleet_page import tile
+from damadics_dashboard.pages.playback import Truth
+from damadics_dashboard.pages.plots import time_plot
+from damadics_dashboard.pages.replay_page import truth_words
+from damadics_dashboard.pages.valve.trend_card import points_of
+from damadics_dashboard.report.content import Sources, valve_report
+from damadics_dashboard.store.history import History
+from damadics_dashboard.words.commission import commission_words
+from damadics_dashboard.words.texts import texts, use_causes
+from damadics_dashboard.words.valve_words import headline, history_rows
+from damadics_fd.store.intervals import Intervals, Series
+from damadics_fd.store.trends import TrendFile
+from damadics_msgs.msg import FaultEvent, FaultFlag
+
+EN, DE = texts('en'), texts('de')
+
+
+def test_the_verdict_of_commission_is_told_in_the_readers_language():
+    told = {
+        'Commissioned': 'limited',
+        'Friction change found within an hour (%)': '18.5',
+        'Stiffness change found within an hour (%)': '2',
+        'Commissioned because': 'P1 is a constant\x1b that somebody typed in',
+    }
+    words = commission_words(told, EN)
+    assert (words.verdict, words.title) == ('limited', 'Commissioned: limited.')
+    assert '18.5 %' in words.finds and '2 %' in words.finds
+    assert words.because == 'P1 is a constant that somebody typed in'
+    assert '18,5 %' in commission_words(told, DE).finds
+    assert commission_words({'Commissioned': 'no'}, EN).title == 'Not commissioned.'
+    assert commission_words({}, EN).verdict == '', 'a detector that tells nothing'
+    assert commission_words({'Commissioned': '<b>'}, EN).verdict == 'no'
+
+
+def test_the_tag_that_the_nodes_were_given_counts_more_than_that_of_a_driver():
+    valve, flag = Valve('lv101'), FaultFlag(state=FaultFlag.STATE_HEALTHY)
+    flag.header.frame_id = 'LC74_20'
+    valve.take_flag(flag, 0.0)
+    valve.take_tag('actuator')  # the name that nodes have without one
+    assert valve.tag == 'LC74_20'
+    valve.take_tag('LV-101')
+    valve.take_flag(flag, 1.0)
+    assert valve.tag == 'LV-101'
+
+
+def test_the_detectors_trend_is_taken_over_by_the_tag_of_the_nodes(tmp_path):
+    series = TrendFile(tmp_path / 'signatures', 'LV-101', 'abc')
+    series.add(1_700_000_000 * 10**9, [0.1, 2.0, 0.3], [0.01, 1.0, 0.02])
+    points = TrendPoints(Intervals(tmp_path / 'trends.sqlite'), [tmp_path / 'signatures'])
+    valve = Valve('lv101')
+    for tag in ('LC74_20', 'LV-101'):
+        valve.take_tag(tag)
+        points.take(valve)
+    assert points.intervals.valves() == ['lv101']
+    points.close()
+
+
+def test_a_report_names_the_tag_after_a_restart_too(tmp_path):
+    history = History(tmp_path / 'history.sqlite')
+    history.keep_tag('lv101', 'LV-100')
+    history.keep_tag('lv101', 'LV-101')
+    history.close()
+    history, trends = History(tmp_path / 'history.sqlite'), Intervals(tmp_path / 'trends.sqlite')
+    assert history.tags() == {'lv101': 'LV-101'}
+    report = valve_report(Sources(history, trends), 'lv101', 0.0, 1e9, EN)
+    assert report.title == 'Report on lv101 LV-101' and ('Tag', 'LV-101') in report.facts
+    history.close()
+    trends.close()
+
+
+@pytest.mark.parametrize('text', ['raised 1: velocity residual 1.02 x threshold', ''])
+def test_the_history_says_what_is_wrong_in_words_and_not_the_programmers(text):
+    row = {**event(FaultEvent.RAISED, text), 'ratio': 1.02, 'cause': ''}
+    (shown,) = history_rows([row], EN)
+    assert shown['text'] == 'The valve moves otherwise than learned, up to 102 % of limit.'
+    assert 'velocity residual' not in shown['more'] and shown['more'].startswith('Inspect')
+    assert headline(row, DE)[0].endswith('bis 102 % der Grenze.')
+
+
+def test_a_valve_that_is_not_monitored_shows_no_residual_of_before():
+    valve = Valve('lv101')
+    valve.take_flag(FaultFlag(state=FaultFlag.STATE_HEALTHY, residual=0.4, threshold=0.5), 100.0)
+    assert tile(valve, EN, 100.1, 0)['ratio'] == '80 % of limit'
+    told = tile(valve, EN, 200.0, 0)
+    assert (told['kind'], told['ratio'], told['share']) == ('off', '', 0.0)
+
+
+def test_a_point_of_a_trend_that_stands_alone_is_drawn():
+    start = np.array([0.0, 900.0, 90_000.0])
+    ones = np.ones(3)
+    found = Series(start, 900.0, ones, ones, ones, ones, [])
+    drawn = points_of(found, ones)
+    parts = [[]]
+    for time, value in drawn:
+        if value is None:
+            parts.append([])
+        else:
+            parts[-1].append(time)
+    assert [len(part) > 1 for part in parts] == [True, True], 'a line needs two points'
+
+
+def test_the_legend_names_each_curve_once_and_no_edge_of_a_band():
+    names = ['Least', 'Mean', 'Greatest', 'Limit', 'Limit']
+    options = time_plot(names, '%', bands=('Least', 'Greatest'), dashed=('Limit',))
+    assert options['legend']['data'] == ['Mean', 'Limit']
+    assert [s['name'] for s in options['series']] == names
+
+
+def test_what_was_simulated_is_told_in_the_readers_language():
+    assert truth_words(None, EN) == ''
+    assert truth_words(Truth(4, 70.0, 1.87), EN) == (
+        'fault f4 was simulated from 70.00 s, flagged 1.87 s later'
+    )
+    assert truth_words(Truth(4, 70.0, math.nan), DE) == (
+        'Fehler f4 wurde ab 70,00 s simuliert, nicht gemeldet'
+    )
+    assert truth_words(Truth(0), DE) == 'kein Fehler wurde simuliert'
+
+
+def test_the_texts_of_causes_can_be_edited_and_a_mistake_is_named(tmp_path, capsys):
+    file = tmp_path / 'causes.yaml'
+    file.write_text(
+        'causes: {friction_up: {text: "Friction of {value} too much.", advice: "Call Bert."}}\n'
+    )
+    row = {'cause': 'friction_up', 'strength': 1.65}
+    try:
+        use_causes(file)
+        assert headline(row, texts('en'))[2] == 'Call Bert.'
+        assert headline(row, texts('de'))[2] == 'Call Bert.'
+        assert headline({**row, 'cause': 'spring_softer'}, texts('de'))[0].startswith('Die Feder')
+    finally:
+        use_causes(None)
+    file.write_text('causes: {friktion: {text: "x"}}\n')
+    assert dashboard(['--causes', str(file)]) == 2
+    assert 'no such cause: friktion' in capsys.readouterr().err
+    assert headline(row, texts('en'))[2] != 'Call Bert.'
