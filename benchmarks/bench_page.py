@@ -101,7 +101,52 @@ def paint(page, address: str) -> float:
     return min(times) / 1e3
 
 
-def measure(folder: Path, seconds: float) -> dict[str, float | int]:
+SEARCH = """new Promise(done => {
+  const field = document.getElementById('search'), begun = performance.now();
+  field.value = 'V-0123';
+  field.dispatchEvent(new Event('input'));
+  requestAnimationFrame(() => setTimeout(() => {
+    const took = performance.now() - begun;
+    field.value = '';
+    field.dispatchEvent(new Event('input'));
+    done(took); })); })"""
+
+
+def resident(pid: int) -> float:
+    """Return the memory of a process, MB."""
+    pages = int(Path(f'/proc/{pid}/statm').read_text().split()[1])
+    return pages * 4096 / 1e6
+
+
+def measure_fleet(site: page_site.Site, page, count: int) -> dict[str, float | int]:
+    """Show a fleet: frames while it is scrolled, time of a search, memory."""
+    layout, status = page_site.fleet_messages(count)
+    site.voices.say('/fleet/layout', layout)
+    done = threading.Event()
+
+    def report() -> None:
+        while not done.wait(1.0):
+            status.header.stamp = site.voices.node.get_clock().now().to_msg()
+            site.voices.say('/fleet/status', status)
+
+    reporter = threading.Thread(target=report, daemon=True)
+    reporter.start()
+    page.goto(site.address)
+    page.wait_for_function(
+        f"document.querySelectorAll('.tile').length >= {count}", timeout=120_000
+    )
+    found: dict[str, float | int] = {
+        f'frames a second, {count} tiles scrolled': max(page.evaluate(FRAMES) for _ in range(3)),
+        f'search among {count} tiles, ms': min(page.evaluate(SEARCH) for _ in range(3)),
+        f'server with {count} valves, MB': resident(site.processes.pid('dashboard')),
+        f'renderer with {count} tiles, MB': resident(renderer_of(page)),
+    }
+    done.set()
+    reporter.join(5.0)
+    return found
+
+
+def measure(folder: Path, seconds: float, counts: list[int]) -> dict[str, float | int]:
     found: dict[str, float | int] = {}
     with pytest.MonkeyPatch.context() as patch:
         site = page_site.Site(folder, patch)
@@ -135,19 +180,8 @@ def measure(folder: Path, seconds: float) -> dict[str, float | int]:
                 share = (cpu(pid) - before[kind]) / drawn * REDRAWS
                 found[f'{kind} at {REDRAWS:g} redraws a second, % of a core'] = 100.0 * share
             source.close()
-            layout, status = page_site.fleet_messages(1000)
-            site.voices.say('/fleet/layout', layout)
-            for _ in range(3):
-                status.header.stamp = site.voices.node.get_clock().now().to_msg()
-                site.voices.say('/fleet/status', status)
-                time.sleep(0.5)
-            page.goto(site.address)
-            page.wait_for_function(
-                "document.querySelectorAll('.tile').length >= 1000", timeout=60_000
-            )
-            found['frames a second, 1 000 tiles scrolled'] = max(
-                page.evaluate(FRAMES) for _ in range(3)
-            )
+            for count in counts:
+                found |= measure_fleet(site, page, count)
             for other in ('/history', '/replay'):
                 page.goto(site.address + other)
                 page.wait_for_timeout(500)
@@ -161,9 +195,12 @@ def main() -> int:
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
     parser.add_argument('--seconds', type=float, default=20.0, help='of measurement (20)')
+    parser.add_argument(
+        '--valves', type=int, nargs='*', default=[1000, 10_000], help='of a fleet (1000 10000)'
+    )
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        print(json.dumps(measure(Path(folder), options.seconds), indent=2))
+        print(json.dumps(measure(Path(folder), options.seconds, options.valves), indent=2))
     return 0
 
 

@@ -39,7 +39,8 @@ def year(tmp_path_factory):
     for k in range(0, 365 * DAY, step):
         share = k / (365 * DAY)
         values = {'friction': 1.65 * share, 'spring': 0.01 * math.sin(9 * share), 'preload': 2.0}
-        trends.add('lv101', BEGIN + k, values, {'friction': 0.02, 'spring': 0.001})
+        std = {'friction': 0.02, 'spring': 0.001}
+        trends.add('lv101', BEGIN + k, values, std, '1,0.25,0.05,0.04')
     trends.close()
     history = History(state / 'history.sqlite')
     with pytest.MonkeyPatch.context() as patch:
@@ -57,6 +58,7 @@ def year(tmp_path_factory):
         patch.setattr(time, 'time', lambda: BEGIN + 361 * DAY)
         action = {'valve': 'lv101', 'action': 'acknowledge', 'user': 'Anna', 'role': 'operator'}
         history.add_action({**action, 'comment': '<b>=1+1</b>', 'done': 1, 'result': 'done'})
+    history.keep_tag('lv101', 'LV-101')
     history.close()
     return state
 
@@ -84,6 +86,7 @@ def test_a_valve_year_tells_cause_size_dates_and_who_did_what(year, tmp_path, ca
     assert 'Limit +300 % in about' in text.replace('\n', ' ')
     html = (tmp_path / 'report_lv101.html').read_text()
     assert '&lt;b&gt;=1+1' in html and '<b>=1+1' not in html
+    assert html.count('class="before"') == 2 and 'Valve signature' in text, 'both branches'
     assert 'http' not in html.replace('http-equiv', ''), 'it needs nothing else'
     rows = list(
         csv.DictReader(io.StringIO((tmp_path / 'report_lv101.csv').read_text('utf-8-sig')))
@@ -100,8 +103,8 @@ def test_the_fleet_lists_the_worst_first_and_counts_by_eemua(year, tmp_path):
 
 
 def test_german(year, tmp_path):
-    assert report(year, tmp_path, 'lv101', '--as', 'pdf', '--language', 'de') == 0
-    text = pypdf.PdfReader(tmp_path / 'report_lv101.pdf').pages[0].extract_text()
+    assert report(year, tmp_path, 'LV-101', '--as', 'pdf', '--language', 'de') == 0, 'by its tag'
+    text = pypdf.PdfReader(tmp_path / 'report_LV-101.pdf').pages[0].extract_text()
     assert 'Die Reibung beträgt das 2,6-Fache des Normalen.' in text
 
 

@@ -223,7 +223,7 @@ def main(args: Sequence[str] | None = None) -> int:
                 done = run_all(jobs, arguments.format, stop, bar=not arguments.quiet)
     except (ValueError, OSError, BagError) as error:
         print(f'simulate: {error}', file=sys.stderr)
-        return 1
+        return 2 if isinstance(error, ValueError) else 1
     if not done:
         print(f'simulate: interrupted; what is in {arguments.out} is valid', file=sys.stderr)
         return _INTERRUPTED

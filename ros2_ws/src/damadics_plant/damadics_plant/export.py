@@ -157,7 +157,7 @@ def _check_space(path: Path, jobs: Sequence[Job]) -> None:
     existing = next(p for p in (path.absolute(), *path.absolute().parents) if p.exists())
     free = shutil.disk_usage(existing).free
     if wanted > free:
-        raise ValueError(
+        raise OSError(
             f'--out: {samples} samples need about {wanted / 1e9:.0f} GB, '
             f'{existing} has {free / 1e9:.0f} GB; lower --rate'
         )

@@ -136,12 +136,24 @@ def application(watch: Watch, actions: Actions, stream: Stream, guard: Guard) ->
         valve: str,
         grant: Grant,
         body: Body,
-        **values: int | float,
+        *,
+        occurrence: int = 0,
+        duration: float = 0.0,
+        strokes: tuple[float, int] = (0.0, 0),
     ) -> Response:
         if valve not in watch.valves:
             raise HTTPException(404, 'there is no such valve: see /api/fleet')
         user = grant.name or body.user or grant.role
-        answer = await actions.do(action, valve, user, body.comment, **values)
+        answer = await actions.do(
+            action,
+            valve,
+            user,
+            body.comment,
+            occurrence=occurrence,
+            duration=duration,
+            amplitude=strokes[0],
+            count=strokes[1],
+        )
         return JSONResponse(
             {'done': answer.done, 'text': answer.text}, 200 if answer.done else 409
         )
@@ -164,8 +176,8 @@ def application(watch: Watch, actions: Actions, stream: Stream, guard: Guard) ->
     @app.post('/api/partial_stroke/{valve:path}')
     async def partial_stroke(valve: str, body: PartialStrokeBody, grant: operator) -> Response:
         """Ask the driver of a valve for small strokes, where its detector allows them."""
-        asked = {'amplitude': body.amplitude, 'count': body.count}
-        return await done('partial_stroke', valve, grant, body, **asked)
+        asked = body.amplitude, body.count
+        return await done('partial_stroke', valve, grant, body, strokes=asked)
 
     @app.get('/metrics', dependencies=[viewer])
     def metrics() -> Response:

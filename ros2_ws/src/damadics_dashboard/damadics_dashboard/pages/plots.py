@@ -14,9 +14,9 @@ from nicegui import ui
 from damadics_dashboard.live.traces import Points, Trace, block_means, envelope
 from damadics_dashboard.pages.elements import box, tell, with_values
 
-BUCKETS = 300  # intervals across a plot: two points each at most
+BUCKETS = 240  # intervals across a plot: two points each at most, three pixels wide
 BLOCK = NANO // 10  # of the signature: means over 0.1 s cancel 50 and 60 Hz hum
-EVERY = 5  # turns between two of a slow plot
+HALF, SLOW = 2, 5  # turns between two of a plot that nobody watches closely, of a slow one
 SMALLEST = 1e-5  # 1/s; a logarithmic axis has no zero
 
 Area: TypeAlias = list[dict[str, float]]  # {'xAxis': begin}, {'xAxis': end} [s]
@@ -255,12 +255,12 @@ class Feed:
 
     :param curves: the curves of each plot.
     :param window: time shown [s].
-    :param slow: plots of what changes slowly: fed every fifth time only.
+    :param every: turns between two of a plot, where not every turn feeds it.
     """
 
     curves: dict[int, list[Curve]]
     window: float = 60.0
-    slow: frozenset[int] = frozenset()
+    every: dict[int, int] = field(default_factory=dict)
     _turn: int = field(default=0, init=False)
     _end: int = field(default=-1, init=False)
 
@@ -295,7 +295,7 @@ class Feed:
         message: dict[int, News] = {}
         for plot, curves in self.curves.items():
             everything = any(c.sent < begin for c in curves)
-            if plot in self.slow and self._turn % EVERY and not everything:
+            if self._turn % self.every.get(plot, 1) and not everything:
                 continue
             series, starts = [], []
             for curve in curves:

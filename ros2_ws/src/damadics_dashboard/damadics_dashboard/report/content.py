@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from damadics_fd.store.intervals import TRENDED, Intervals, Series
 from damadics_msgs.msg import FaultEvent
 
+from damadics_dashboard.report.signature import SignatureLines, signature_lines
 from damadics_dashboard.store.history import History, Wanted
 from damadics_dashboard.store.rows import ActionRow, EventRow
 from damadics_dashboard.words.outlook import outlook_words, value_words
@@ -45,6 +46,7 @@ class Report:
     trends: list[tuple[str, str, Series, tuple[float, ...]]]  # name, quantity, curve, limits
     footer: str
     events: list[EventRow]
+    signature: SignatureLines | None = None
 
 
 class Sources:
@@ -179,6 +181,7 @@ def valve_report(sources: Sources, valve: str, since: float, until: float, t: Te
         trends,
         t('report_footer'),
         events,
+        signature_lines([(quantity, found) for _, quantity, found, _ in trends]),
     )
 
 

@@ -44,7 +44,7 @@ def html(report: Report, t: Texts) -> str:
     :param t: the words.
     :return: HTML.
     """
-    return render('report.html', report=report, charts=charts_of(report), language=t.language)
+    return render('report.html', report=report, charts=charts_of(report), t=t, language=t.language)
 
 
 def text_csv(report: Report) -> str:

@@ -12,6 +12,7 @@ from fpdf.fonts import FontFace
 
 from damadics_dashboard.report.content import Report
 from damadics_dashboard.report.forms import Chart, charts_of
+from damadics_dashboard.report.signature import SignatureLines
 from damadics_dashboard.words.texts import Texts
 
 INK, MUTED, LINE = (21, 32, 43), (86, 100, 115), (213, 221, 229)
@@ -20,7 +21,7 @@ Color = tuple[int, int, int]
 WIDTH, HEIGHT = 180.0, 34.0  # mm, of a chart
 FONT = 'DejaVu'
 LONGEST_WORD = 60  # characters that fit on a line of a table
-MOST_CHARTS = 4  # what is left of the first page
+MOST_CHARTS = 3  # what is left of the first page
 
 
 def pdf(report: Report, t: Texts) -> bytes:
@@ -41,6 +42,8 @@ def pdf(report: Report, t: Texts) -> bytes:
     paper.table_of([name for name, _ in report.facts], [[value for _, value in report.facts]])
     for n, line in enumerate(report.summary):
         paper.line_of(line, 12.0 if n == 0 else 10.0, INK if n < 2 else MUTED)
+    if report.signature:
+        paper.signature(report.signature, t)
     for chart in charts_of(report)[:MOST_CHARTS]:
         paper.chart(chart, t)
     for title, heads, rows in report.tables:
@@ -106,6 +109,22 @@ class _Paper(FPDF):
                 row = table.row()
                 for text in line:
                     row.cell(_broken(str(text)))
+
+    def signature(self, lines: SignatureLines, t: Texts) -> None:
+        """Draw force over position, fault-free and at the end."""
+        self.heading(t('signature_title'), 9.0)
+        left, top, width = self.get_x() + 16.0, self.get_y() + 1.0, WIDTH - 16.0
+        self.set_draw_color(*LINE)
+        self.rect(left, top, width, HEIGHT)
+        self.set_line_width(0.35)
+        for color, both in ((MUTED, lines.before), (BLUE, lines.now)):
+            self.set_draw_color(*color)
+            for (x1, y1), (x2, y2) in both:
+                high, low = (top + HEIGHT * (1.0 - y) for y in (y1, y2))
+                self.line(left + width * x1, high, left + width * x2, low)
+        self.set_line_width(0.2)
+        self.set_y(top + HEIGHT + 1.0)
+        self.line_of(t('signature_report'), 7.0, MUTED)
 
     def chart(self, chart: Chart, t: Texts) -> None:
         """Draw a trend: band of least and greatest, mean, limits."""

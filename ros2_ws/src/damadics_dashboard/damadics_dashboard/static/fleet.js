@@ -52,6 +52,9 @@
     parts.fresh = make('span', '', fresh);
     fresh.append(' ');
     parts.age = make('b', '', fresh);
+    item.addEventListener('contentvisibilityautostatechange', (event) => {
+      parts.age.away = event.skipped;
+    });
     link.dataset.valve = name;
     return parts;
   }
@@ -67,6 +70,7 @@
       tiles.set(name, tile);
     }
     tile.told = told;
+    tile.text = `${told.title} ${told.tag} ${told.state} ${told.why}`.toLowerCase();
     const p = tile.parts;
     p.link.className = `tile ${told.kind}`;
     p.link.dataset.kind = told.kind;
@@ -134,8 +138,7 @@
     tiles.forEach((tile) => {
       const t = tile.told;
       counts[t.kind] = (counts[t.kind] || 0) + 1;
-      const text = `${t.title} ${t.tag} ${t.state} ${t.why}`.toLowerCase();
-      const good = words.every((word) => text.includes(word))
+      const good = words.every((word) => tile.text.includes(word))
         && (!filter.kind || t.kind === filter.kind) && (!filter.area || t.area === filter.area);
       if (tile.parts.item.hidden === good) tile.parts.item.hidden = !good;
       if (good) { found += 1; full.set(t.area, true); }

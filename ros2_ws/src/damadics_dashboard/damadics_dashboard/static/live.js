@@ -49,6 +49,7 @@
     const wanted = present === 'good' ? title : `(${words.short || '!'}) ${title}`;
     if (document.title !== wanted) document.title = wanted;
     document.querySelectorAll('[data-age]').forEach((element) => {
+      if (element.away) return; // a tile out of sight: nobody reads it
       if (element.told !== element.dataset.age) {
         element.told = element.dataset.age;
         element.toldAt = now;

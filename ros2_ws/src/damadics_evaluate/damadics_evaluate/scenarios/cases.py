@@ -4,6 +4,7 @@
 
 import re
 from dataclasses import dataclass
+from difflib import get_close_matches
 from functools import cache
 
 from damadics_evaluate.indices import T_ON, T_OVER, Zones
@@ -91,8 +92,11 @@ def case(name: str) -> Case:
         return Case(name, int(free[1]), Zones())
     match = re.fullmatch(r'f(\d+)_([SMBI])', name)
     if name not in SCENARIOS or match is None:
+        near = get_close_matches(name, SCENARIOS, 1)
         raise ValueError(
-            f'no scenario {name}: one of {", ".join(SCENARIOS)}, f11@0.37, my.yaml:mine or '
+            f'no scenario {name}: do you mean {near[0]}?'
+            if near
+            else f'no scenario {name}: one of {", ".join(SCENARIOS)}, f11@0.37, my.yaml:mine or '
             'my.py:fault'
         )
     fault, mode = int(match[1]), match[2]

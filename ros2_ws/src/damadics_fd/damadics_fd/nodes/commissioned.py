@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What `commission` has found out about a valve, as the file of the valve tells its nodes."""
 
-import math
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from damadics_fd.core.settings.identified import VERDICTS
 from damadics_fd.core.text import SENTENCE, plain
 
 NOT_YET = 'no'
+LARGEST = 10.0  # share; a change that is found from there on only is not told
 FOUND = {'Friction': 'friction_in_an_hour', 'Stiffness': 'spring_in_an_hour'}
 
 
@@ -29,10 +29,12 @@ def commissioned(files: Iterable[Path]) -> dict[str, str]:
     for file in files:
         told = _section(file) or told
     verdict = told.get('verdict')
-    found = {'Commissioned': str(verdict) if verdict in VERDICTS else NOT_YET}
+    if verdict not in VERDICTS:
+        return {'Commissioned': NOT_YET}
+    found = {'Commissioned': str(verdict)}
     for name, key in FOUND.items():
         share = told.get(key)
-        if isinstance(share, int | float) and math.isfinite(share) and share > 0.0:
+        if isinstance(share, int | float) and 0.0 < share < LARGEST:
             found[f'{name} change found within an hour (%)'] = f'{100.0 * share:.2g}'
     reasons = told.get('reasons')
     if isinstance(reasons, list) and reasons:
@@ -44,6 +46,6 @@ def _section(file: Path) -> Saved:
     """Return what a file tells of the commissioning; {} where it cannot be read."""
     try:
         content: Plain = yaml.safe_load(file.read_text('utf-8'))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError):
+    except (OSError, ValueError, RecursionError, yaml.YAMLError):
         return {}  # the middleware has read what parameters it needs, and refused a bad file
     return section(content, COMMISSION)

@@ -215,6 +215,7 @@ class InputWatch:
     def _remind(self) -> None:
         if self.silent:
             self._timer.timer_period_ns = int(NEXT_WORDS * 1e9)
+            self._timer.reset()  # the turn that is under way would still be the short one
             since = 'waiting for' if self._wall is None else 'nothing comes any more on'
             self._node.get_logger().warning(f'{since} {self._name}: {self._command}')
         else:

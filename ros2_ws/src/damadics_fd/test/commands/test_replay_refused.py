@@ -180,3 +180,8 @@ def test_results_that_cannot_be_written_are_refused_before_the_work(tmp_path, ca
     for option in (['--out', str(table / 'a.json')], ['--figures', str(table)]):
         assert main([str(table), '--mode', 'paper', *option]) == 1
         assert f'{table} cannot be created' in capsys.readouterr().err
+
+
+def test_the_actuator_of_a_table_is_no_option_of_a_bag(tmp_path, capsys):
+    assert main([str(tmp_path / 'a.mcap'), '--actuator', '1']) == 2
+    assert 'choose with --topic' in capsys.readouterr().err

@@ -9,7 +9,15 @@ from nicegui import ui
 from damadics_dashboard.live.valve import Valve
 from damadics_dashboard.pages.elements import box, markup, redraw
 from damadics_dashboard.pages.frame import card
-from damadics_dashboard.pages.plots import Curve, Options, Plot, signature_plot, time_plot
+from damadics_dashboard.pages.plots import (
+    HALF,
+    SLOW,
+    Curve,
+    Options,
+    Plot,
+    signature_plot,
+    time_plot,
+)
 from damadics_dashboard.words.texts import Texts
 
 BAR = 1e-5  # bar per Pa
@@ -58,9 +66,9 @@ class Signals:
         redraw(self._values, 'values.html', cells=cells)
 
     @property
-    def slow(self) -> frozenset[int]:
-        """The plots of process values, which change slowly."""
-        return frozenset((self._pressures.id, self._flows.id))
+    def every(self) -> dict[int, int]:
+        """Turns between two of a plot: process values change slowly."""
+        return {self._velocities.id: HALF, self._pressures.id: SLOW, self._flows.id: SLOW}
 
     def _plot(self, curves: list[Curve], options: Options, colors: list[str], label: str) -> Plot:
         plot = Plot(options, colors, label, group=GROUP, empty=self._t('no_data_yet'))
@@ -105,7 +113,7 @@ class Signals:
     def _velocity(self) -> None:
         t = self._t
         with card(t('velocity_title'), t('velocity_remark')):
-            self._plot(
+            self._velocities = self._plot(
                 [Curve(self._valve.traces['estimate'], 'x2')],
                 time_plot([t('velocity')], '1/s'),
                 ['--velocity'],

@@ -107,7 +107,7 @@ class _Page:
         self._grid = box('div', 'grid')
         with self._grid:
             self._signals = Signals(valve, t, SIGNATURE_NOW)
-        self._feed = Feed(self._signals.curves, window, self._signals.slow)
+        self._feed = Feed(self._signals.curves, window, self._signals.every)
         self._trends = TrendCard(watcher.trends.intervals, valve, t, days)
         with card(t('history'), classes='w-full'):
             self._history = markup('history.html', rows=[], empty='', heads=[], named=False)

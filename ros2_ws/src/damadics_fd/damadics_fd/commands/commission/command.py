@@ -157,6 +157,7 @@ def main(args: list[str] | None = None) -> int:
                 str(options.reference or ''),
             )
             options.out.write_text(text, encoding='utf-8')
+            print(f'written: {options.out}')
         if options.reference and identified.verdict != REFUSED:
             _write_reference(identified, recordings, options, source)
     except (BagError, CommissioningError, SettingsError, KeyError, OSError, ValueError) as error:

@@ -26,6 +26,7 @@ from damadics_fd.figures.decimation import Thinner
 from damadics_fd.figures.valve_signature import ForceMap, force_over_position
 
 NO_RESULT = 0.9  # share of refused samples from which on nothing was monitored
+FAST = 5.0  # Hz; mode scada is for the second of a control room
 NEEDED = {
     'paper': ('cv', 'x1'),
     'scada': ('cv', 'x1'),
@@ -126,6 +127,9 @@ def _replay(
     outcome.samples_per_s = outcome.samples / spent
     outcome.lossy = bool(outcome.problems) and not recording.table
     outcome.refused, outcome.status = monitor.refused, monitor.status
+    rate = outcome.samples / max(outcome.duration_s, 1e-9)
+    if plan.mode == 'scada' and rate > FAST:
+        outcome.status += f'; samples at {rate:.0f} Hz, for which there is --mode monitor'
     _judge_refused(outcome, lacking)
     if thinner and plan.figures:
         _draw(thinner, recording, outcome, plan.figures / f'{stem}.png')

@@ -44,6 +44,10 @@ COLUMNS = {  # of a row and their types in Parquet
 }
 
 
+def _pace(samples: float) -> str:
+    return f'{samples / 1e6:.2f} M' if samples >= 1e4 else f'{samples:,.0f}'
+
+
 def print_table(outcomes: Sequence[Outcome]) -> None:
     """Print one line per recording."""
     rows = [('bag', 'mode', 'samples', 'duration', 'samples/s', 'detections [s]')]
@@ -64,7 +68,7 @@ def print_table(outcomes: Sequence[Outcome]) -> None:
                 outcome.mode,
                 f'{outcome.samples:,}',
                 f'{outcome.duration_s:.1f} s',
-                f'{outcome.samples_per_s / 1e6:.2f} M',
+                _pace(outcome.samples_per_s),
                 text + (f'  ({refused} samples refused)' if refused else ''),
             )
         )

@@ -205,6 +205,10 @@ def main(args: list[str] | None = None) -> int:
         for folder in (options.out and options.out.parent, options.figures, options.bag):
             if folder and folder != BESIDE:
                 make_folder(folder)
+        if options.actuator and not options.live and all(_is_bag(path) for path in options.bags):
+            raise SettingsError(
+                [f'--actuator {options.actuator} is for tables of the plant: choose with --topic']
+            )
         recordings = find_recordings(
             options.bags, options.topic, parse_maps(options.map), options.actuator, left_out
         )
@@ -224,6 +228,7 @@ def main(args: list[str] | None = None) -> int:
             report_problems(outcome.problems)
         if options.out:
             write_outcomes(outcomes, options.out)
+            print(f'written: {options.out}')
     except SettingsError as error:
         print(f'replay: {with_suggestions(error)}', file=sys.stderr)
         return 2
@@ -235,6 +240,10 @@ def main(args: list[str] | None = None) -> int:
         return 130
     lossy = LOSSY if any(outcome.lossy for outcome in outcomes) else 0
     return report_errors([outcome.error for outcome in outcomes if outcome.error]) or lossy
+
+
+def _is_bag(path: Path) -> bool:
+    return path.name.endswith(('.mcap', '.db3', '.mcap.zstd', '.db3.zstd'))
 
 
 def report_problems(problems: Sequence[str]) -> None:
