@@ -146,3 +146,17 @@ def test_the_texts_of_causes_can_be_edited_and_a_mistake_is_named(tmp_path, caps
     assert dashboard(['--causes', str(file)]) == 2
     assert 'no such cause: friktion' in capsys.readouterr().err
     assert headline(row, texts('en'))[2] != 'Call Bert.'
+
+
+def test_the_tile_says_why_a_valve_is_not_monitored():
+    valve = Valve('lv101')
+    valve.take_flag(FaultFlag(state=FaultFlag.STATE_NOT_MONITORING), 100.0)
+    assert tile(valve, EN, 100.1, 0)['why'].startswith('the input is silent or refused')
+    cause = 'the input has failed: out_of_range: x1 = 55, for 4 s: check transmitter'
+    valve.diagnostics['estimator'] = {'Message': cause, 'Publishers': '1'}
+    valve.levels['estimator'], valve.told_at['estimator'] = 2, 100.0
+    assert tile(valve, EN, 100.1, 0)['why'] == cause
+    valve.diagnostics['estimator']['Publishers'] = '2'
+    assert tile(valve, EN, 100.1, 0)['why'] == '2 nodes send its measurement: only one may'
+    valve.take_flag(FaultFlag(state=FaultFlag.STATE_NOT_MONITORING), 110.0)
+    assert 'refused' in tile(valve, EN, 110.1, 0)['why'], 'what an estimator told that has died'

@@ -88,6 +88,7 @@ class Valve:
         self.period = 0.0
         self.diagnostics: dict[str, dict[str, str]] = {}
         self.levels: dict[str, int] = {}
+        self.told_at: dict[str, float] = {}  # monotonic time of the diagnostics [s]
         self.events: deque[EventRow] = deque(maxlen=100)
         self.acknowledged: set[int] = set()
         self.peak = 0.0  # largest residual / threshold of this second

@@ -337,6 +337,7 @@ class Watcher:
                 valve.diagnostics[kind] = {v.key: v.value for v in status.values}
                 valve.diagnostics[kind]['Message'] = status.message
                 valve.levels[kind] = status.level[0]
+                valve.told_at[kind] = time.monotonic()
                 valve.take_tag(status.hardware_id)
 
 

@@ -14,7 +14,7 @@ from damadics_dashboard.pages.alarms import AlarmList
 from damadics_dashboard.pages.elements import markup, tell
 from damadics_dashboard.pages.frame import card, frame
 from damadics_dashboard.words.texts import Texts
-from damadics_dashboard.words.valve_words import address, area_of, detail_of, headline, of_limit
+from damadics_dashboard.words.valve_words import address, area_of, headline, of_limit, reason_of
 
 PERIOD = 0.2  # s
 LARGE = 100  # valves from which on the page is drawn twice a second
@@ -133,7 +133,7 @@ def tile(valve: Valve, t: Texts, now: float, clock: int) -> Tile:
     condition = valve.condition(now, clock)
     alarm = valve.alarm()
     why = '' if condition.kind == 'off' and condition.value == condition.value else None
-    why = detail_of(condition, t) if why is None else t(f'{condition.detail}_short')
+    why = reason_of(valve, condition, t, now) if why is None else t(f'{condition.detail}_short')
     badge, hot = '', False
     if alarm is not None:
         what, _, _ = headline(alarm.evidence, t)

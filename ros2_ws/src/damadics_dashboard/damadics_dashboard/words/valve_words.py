@@ -9,7 +9,7 @@ from urllib.parse import quote
 
 from damadics_fd.causes import Cause
 from damadics_fd.core.stamps import SECOND as NANO
-from damadics_fd.core.text import SENTENCE, plain
+from damadics_fd.core.text import COMMENT, SENTENCE, plain
 from damadics_msgs.msg import FaultEvent
 
 from damadics_dashboard.live.valve import NE107, Alarm, Condition, Valve
@@ -17,6 +17,7 @@ from damadics_dashboard.store.rows import Cell, EventRow
 from damadics_dashboard.words.texts import Texts
 
 SHARED = ('', 'none')
+RECENT = 3.0  # s; diagnostics come every second
 TRANSITIONS = {
     FaultEvent.RAISED: 'raised',
     FaultEvent.CLEARED: 'cleared',
@@ -83,6 +84,26 @@ def detail_of(condition: Condition, t: Texts) -> str:
     if condition.detail == 'learned_share':
         return t('learned_share', share=t.percent(condition.value))
     return t(condition.detail, time=t.duration(condition.value))
+
+
+def reason_of(valve: Valve, condition: Condition, t: Texts, now: float) -> str:
+    """
+    Word the detail of a condition, with what the estimator says of its input.
+
+    :param valve: the valve.
+    :param condition: of the valve.
+    :param t: the words.
+    :param now: monotonic time [s].
+    :return: text.
+    """
+    told = valve.diagnostics.get('estimator', {})
+    if now - valve.told_at.get('estimator', -math.inf) < RECENT and not condition.alarm:
+        number = told.get('Publishers', '')
+        if number.isdigit() and int(number) > 1 and condition.kind in ('off', 'learn'):
+            return t('several_publishers', number=number)
+        if condition.detail == 'input_refused' and valve.levels.get('estimator', 0):
+            return plain(told.get('Message', ''), COMMENT) or detail_of(condition, t)
+    return detail_of(condition, t)
 
 
 def cause_of(name: str, t: Texts) -> Cause | None:

@@ -25,10 +25,10 @@ from damadics_dashboard.pages.valve.trend_card import TrendCard
 from damadics_dashboard.words.commission import commission_words
 from damadics_dashboard.words.texts import DASH, Texts
 from damadics_dashboard.words.valve_words import (
-    detail_of,
     headline,
     history_rows,
     of_limit,
+    reason_of,
 )
 
 PERIOD = 0.2  # s
@@ -214,7 +214,7 @@ class _Page:
         return {
             'kind': condition.kind,
             'title': t(condition.title),
-            'detail': detail_of(condition, t),
+            'detail': reason_of(valve, condition, t, now),
             'alarm': told,
             'figures': [
                 _figure(
