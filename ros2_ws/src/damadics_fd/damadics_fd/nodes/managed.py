@@ -11,9 +11,9 @@ from rclpy.parameter import Parameter
 
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.text import NAME, plain
-from damadics_fd.nodes.commissioned import commissioned
 from damadics_fd.nodes.input_watch import InputWatch
 from damadics_fd.ros import own_services
+from damadics_fd.ros.commissioned import commissioned
 from damadics_fd.ros.diagnostics import Diagnostics, Level, Report
 from damadics_fd.ros.entities import Entities
 from damadics_fd.ros.freshness import default_max_age

@@ -5,7 +5,7 @@
 import pytest
 from damadics_fd.commands.commission.valve_file import parameter_file
 from damadics_fd.core.settings.identified import Identified
-from damadics_fd.nodes.commissioned import commissioned
+from damadics_fd.ros.commissioned import commissioned
 
 NUMBERS = {'friction_in_an_hour': 0.185, 'spring_in_an_hour': 0.02, 'misfit': 0.1}
 
