@@ -19,6 +19,7 @@ from ament_index_python.packages import get_package_share_directory
 from damadics_bringup.launcher import tasks_of
 from damadics_bringup.policy import policy
 from damadics_bringup.processes import executable, parameters
+from damadics_bringup.respawn import unless_refused
 from damadics_fd.store.fleet_file import FleetError, Valve, read_fleet
 from damadics_msgs import msg
 
@@ -83,6 +84,28 @@ def test_a_launch_file_starts_what_there_is(path, monkeypatch):
     declared = {a.args[0] for a in actions if a.kind == 'DeclareLaunchArgument'}
     used = set(re.findall(r"LaunchConfiguration\('(\w+)'\)", path.read_text()))
     assert used == declared
+
+
+@pytest.mark.parametrize('path', LAUNCH, ids=lambda path: path.name)
+def test_launch_starts_a_node_again_unless_it_refused_what_it_was_given(path, monkeypatch):
+    actions = described(path, monkeypatch)
+    again = [action for action in actions if getattr(action, 'respawn', False)]
+    if not again:
+        pytest.skip('it starts nothing again')
+    assert again and all(n.on_exit is unless_refused and n.respawn_delay for n in again)
+    monkeypatch.setattr(
+        sys.modules['launch.actions'], 'EmitEvent', lambda event: event, raising=False
+    )
+    for name, content in (
+        ('launch.events', {'matches_action': lambda action: action}),
+        ('launch.events.process', {'ShutdownProcess': lambda process_matcher: process_matcher}),
+    ):
+        monkeypatch.setitem(sys.modules, name, ModuleType(name))
+        vars(sys.modules[name]).update(content)
+    for node in again:
+        for code, given_up in ((0, []), (1, []), (-9, []), (2, [node])):
+            event = SimpleNamespace(returncode=code, action=node)
+            assert node.on_exit(event, None) == given_up
 
 
 @pytest.mark.parametrize('path', LAUNCH, ids=lambda path: path.name)

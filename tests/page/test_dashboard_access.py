@@ -5,14 +5,19 @@
 import asyncio
 import logging
 import re
+import socket
+import threading
+import time
 
 import pytest
 from damadics_dashboard.dashboard import main, read_tokens
+from damadics_dashboard.server import limits
 from damadics_dashboard.server.access import COOKIE, Guard, check_binding
-from damadics_dashboard.server.limits import SizeLimit
+from damadics_dashboard.server.limits import PatientProtocol, SizeLimit
 from damadics_dashboard.server.log import keep_short
 from damadics_fd.store.access import Access, AccessError, Grant, Role
 
+uvicorn = pytest.importorskip('uvicorn')
 TOKEN = '0123456789abcdef'
 OPERATOR = Access([Grant(Role.OPERATOR, TOKEN)])
 
@@ -168,3 +173,54 @@ def test_what_a_visitor_sends_is_a_line_of_the_log(caplog):
         logging.getLogger('engineio.server').exception('message async handler error')
     assert caplog.messages == ['a malformed message was refused: ValueError: unexpected end']
     assert 'Traceback' not in caplog.text
+
+
+@pytest.fixture
+def house(monkeypatch):
+    """A server with the page's protocol, little patience and few places; its port."""
+    monkeypatch.setattr(limits, 'HEAD_TIME', 0.3)
+    monkeypatch.setattr(limits, 'MOST_CONNECTIONS', 5)
+
+    async def answer(scope, receive, send):
+        await welcome(scope, receive, send)
+        await send({'type': 'http.response.body', 'body': b'welcome'})
+
+    config = uvicorn.Config(answer, http=PatientProtocol, log_level='error', lifespan='off')
+    server = uvicorn.Server(config)
+    with socket.create_server(('127.0.0.1', 0)) as door:
+        thread = threading.Thread(target=server.run, kwargs={'sockets': [door]})
+        thread.start()
+        yield door.getsockname()[1]
+        server.should_exit = True
+        thread.join(10.0)
+
+
+def visitor(port: int, words: bytes) -> socket.socket:
+    visit = socket.create_connection(('127.0.0.1', port), 10.0)
+    visit.sendall(words)
+    return visit
+
+
+def test_who_never_ends_the_head_of_a_request_is_shown_the_door(house):
+    begun = b'GET / HTTP/1.1\r\nHost: x\r\n'
+    slow = [visitor(house, part) for part in (b'', b'G', begun, begun + b'X: ')]
+    began = time.monotonic()
+    assert [visit.recv(100) for visit in slow] == [b''] * 4
+    assert time.monotonic() - began < 5.0
+    good = visitor(house, begun + b'\r\n')
+    assert good.recv(100).startswith(b'HTTP/1.1 200')
+
+
+def test_a_full_house_takes_nobody_in_and_goes_on(house):
+    whole = b'GET / HTTP/1.1\r\nHost: x\r\n\r\n'
+    staying = [visitor(house, b'') for _ in range(20)]
+    answers = []
+    deadline = time.monotonic() + 10.0
+    while b'HTTP/1.1 200' not in answers and time.monotonic() < deadline:
+        try:
+            answers.append(visitor(house, whole).recv(12))
+        except OSError:
+            answers.append(b'')
+    assert answers[-1] == b'HTTP/1.1 200', 'those who stayed were not shown the door'
+    for visit in staying:
+        visit.close()

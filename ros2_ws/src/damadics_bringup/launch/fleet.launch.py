@@ -7,6 +7,7 @@ from pathlib import Path
 from ament_index_python.packages import get_package_share_directory
 from damadics_bringup.fleet import MONITORS, simulated, spread
 from damadics_bringup.launcher import arguments_of_all
+from damadics_bringup.respawn import unless_refused
 from damadics_fd.store.fleet_file import read_fleet
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
@@ -26,6 +27,7 @@ def valves(context):
             package='damadics_fd',
             executable='monitors',
             respawn=True,
+            on_exit=unless_refused,
             respawn_delay=1.0,
             arguments=arguments_of_all(group, f'/{name}'),
             output='screen',
@@ -44,6 +46,7 @@ def valves(context):
                 remappings=topics,
                 ros_arguments=['--enclave', f'/{valve.name}/{node}'],
                 respawn=True,
+                on_exit=unless_refused,
                 respawn_delay=1.0,
                 output='screen',
             )

@@ -5,6 +5,7 @@
 from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
+from damadics_bringup.respawn import unless_refused
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.conditions import IfCondition
@@ -75,6 +76,7 @@ def generate_launch_description():
                 namespace=namespace,
                 parameters=parameters,
                 respawn=True,
+                on_exit=unless_refused,
                 respawn_delay=1.0,
                 output='screen',
             ),
@@ -84,6 +86,7 @@ def generate_launch_description():
                 namespace=namespace,
                 parameters=parameters,
                 respawn=True,
+                on_exit=unless_refused,
                 respawn_delay=1.0,
                 output='screen',
             ),

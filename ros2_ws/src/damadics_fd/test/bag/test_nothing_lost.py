@@ -3,20 +3,24 @@
 """What the recorder writes can be read; full disks, lost folders and splits lose nothing."""
 
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
 from damadics_fd.bag import BagError, BagWriter, read_columns, write_columns
 from damadics_fd.bag.checking.inspection import WHOLE, inspect
 from damadics_fd.bag.mcap.reader import McapFile
+from damadics_fd.bag.mcap.records import Op
 from damadics_fd.bag.rosbag2 import qos
 from damadics_fd.bag.salvage import salvage
 from damadics_fd.bag.writing.blackbox import BlackBox
 from damadics_fd.bag.writing.spool import Spool
+from damadics_fd.commands.replay.replay import main as replay
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from .bag_support import needs_messages, simulated
+from .test_fuzz import spans
 from .test_spool import Disk, number, wait_until
 
 pytestmark = needs_messages
@@ -229,3 +233,29 @@ def test_a_folder_that_is_removed_is_made_again_with_all_that_was_in_the_file(tm
         bag.flush()
     assert read_columns(tmp_path / 'bag', '/a')['data'].tolist() == list(range(200))
     assert inspect(tmp_path / 'bag').code == WHOLE
+
+
+GOLDEN = Path(__file__).parents[5] / 'bags'
+
+
+@pytest.mark.parametrize('byte', [40, 51])
+def test_messages_whose_schema_is_lost_are_saved_all_the_same(byte, tmp_path):
+    """The first schema and the end of the file are damaged; every message is still there."""
+    data = bytearray((GOLDEN / 'lugre_nominal.mcap').read_bytes()[:-300])
+    data[byte] ^= 0xFF
+    (tmp_path / 'bad.mcap').write_bytes(data)
+    result = salvage(tmp_path / 'bad.mcap', tmp_path / 'saved.mcap')
+    counts = {name: topic.count for name, topic in inspect(tmp_path / 'saved.mcap').topics.items()}
+    assert counts['/measurement'] == counts['/fault_state'] == 15_001
+    assert result.saved.messages == sum(counts.values())
+
+
+@pytest.mark.parametrize('times', [0, 2])
+def test_a_chunk_that_is_missing_or_doubled_is_told_by_replay(times, tmp_path, capsys):
+    """The records are well formed: only the counts at the end of the file tell."""
+    data = (GOLDEN / 'dablib_friction.mcap').read_bytes()
+    _, (_, begin, end) = [span for span in spans(data) if span[0] == Op.CHUNK]
+    path = tmp_path / 'bad.mcap'
+    path.write_bytes(data[:begin] + data[begin:end] * times + data[end:])
+    replay([str(path), '--mode', 'paper', '--jobs', '1'])
+    assert 'warning' in capsys.readouterr().err
