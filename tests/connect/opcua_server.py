@@ -35,6 +35,7 @@ async def main() -> None:
     p.add_argument('valves', type=int)
     p.add_argument('--rate', type=float, default=0.0, help='of changes of every signal [Hz]')
     p.add_argument('--fast', type=int, default=0, help='further valves that change at 50 Hz')
+    p.add_argument('--signals', type=int, default=7, help='of each valve that change')
     p.add_argument('--user', action='store_true')
     p.add_argument('--certificates', type=Path)
     options = p.parse_args()
@@ -48,13 +49,14 @@ async def main() -> None:
         await server.load_private_key(str(options.certificates / 'server.pem'))
     server.set_security_policy(policies, permission_ruleset=SimpleRoleRuleset())
     space = await server.register_namespace('urn:plant')
-    variables = []
+    slow, fast = [], []
     for number in range(options.valves + options.fast):
         valve = await server.nodes.objects.add_object(space, f'LV{number}')
         for name, value in zip(SIGNALS, START, strict=True):
             node = await valve.add_variable(f'ns={space};s=LV{number}.{name}', name, value)
             await node.set_writable()
-            variables.append(node)
+            if SIGNALS.index(name) < options.signals:
+                (slow if number < options.valves else fast).append(node)
     # let it lie about types, as some servers do
     server.iserver.aspace._is_expected_variant_type = lambda *given: True
     write = server.iserver.aspace.write_attribute_value
@@ -103,10 +105,9 @@ async def main() -> None:
         print('ready', flush=True)
         jobs = []
         if options.rate:
-            slow = variables[: 7 * options.valves]
             jobs.append(asyncio.create_task(change(slow, 1.0 / options.rate)))
         if options.fast:
-            jobs.append(asyncio.create_task(change(variables[7 * options.valves :], 0.02)))
+            jobs.append(asyncio.create_task(change(fast, 0.02)))
         await asyncio.gather(obey(), *jobs)
         await asyncio.Event().wait()
 

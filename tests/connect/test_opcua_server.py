@@ -9,9 +9,10 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from asyncua import Client, ua
+from asyncua import Client, Server, ua
 from connect.detectors import Detectors
 from connect.servers import free_port, listens, wait_for
+from damadics_bringup.processes import executable
 from damadics_msgs.msg import FaultEvent
 
 pytestmark = pytest.mark.ros
@@ -163,3 +164,61 @@ def test_a_foreign_stack_reads_and_hears_the_same(served):
     assert told['event']['message'] == 'friction up'
     assert told['event']['active'] is True and told['event']['acknowledged'] is False
     assert told['health'] == 3 and told['ratio'] == 2.0
+
+
+NODESET = """<?xml version="1.0" encoding="utf-8"?>
+<UANodeSet xmlns="http://opcfoundation.org/UA/2011/03/UANodeSet.xsd">
+  <NamespaceUris><Uri>{uri}</Uri></NamespaceUris>
+  <Models><Model ModelUri="{uri}" Version="1.02" PublicationDate="2021-01-01T00:00:00Z">
+    <RequiredModel ModelUri="http://opcfoundation.org/UA/" Version="1.05.02"
+      PublicationDate="2022-11-01T00:00:00Z" /></Model></Models>
+  <Aliases><Alias Alias="HasSubtype">i=45</Alias></Aliases>
+  <UAObjectType NodeId="ns=1;i={number}" BrowseName="1:{name}">
+    <DisplayName>{name} of the file</DisplayName>
+    <References>
+      <Reference ReferenceType="HasSubtype" IsForward="false">i=58</Reference>
+    </References>
+  </UAObjectType>
+</UANodeSet>
+"""
+
+
+def test_the_types_of_a_nodeset_file_are_used_where_there_is_one(tmp_path):
+    from damadics_connect.opcua.address_space import ValveObject, prepare
+
+    files = []
+    for uri, number, name in ((DI, 1001, 'TopologyElementType'), (PADIM, 1009, 'PADIMType')):
+        files.append(tmp_path / f'{name}.xml')
+        files[-1].write_text(NODESET.format(uri=uri, number=number, name=name))
+
+    async def look():
+        server = Server()
+        await server.init()
+        spaces = await prepare(server, files)
+        kind = server.get_node(spaces.type_id)
+        assert (await kind.read_display_name()).Text == 'PADIMType of the file'
+        assert spaces.padim == await server.get_namespace_index(PADIM)
+        valve = ValveObject(server, spaces)
+        await valve.make(server.nodes.objects, 'lv101', 'LV-101')
+        assert await valve.node.read_type_definition() == spaces.type_id
+
+    asyncio.run(look())
+
+
+@pytest.mark.parametrize(
+    'content', ['<a', NODESET.replace('i=58', 'ns=7;i=1')], ids=['cut', 'odd']
+)
+def test_a_nodeset_file_that_cannot_be_taken_in_is_told_in_one_line(domain, tmp_path, content):
+    (tmp_path / 'a.xml').write_text(content.format(uri=PADIM, number=1009, name='PADIMType'))
+    (tmp_path / 'out.yaml').write_text(
+        f'serve: {{endpoint: "opc.tcp://127.0.0.1:{free_port()}", nodesets: [a.xml]}}\n'
+    )
+    done = subprocess.run(
+        [executable('damadics_connect', 'opcua'), str(tmp_path / 'out.yaml')],
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert done.returncode != 0
+    assert 'serve.nodesets: cannot be taken in' in done.stderr
+    assert 'Traceback' not in done.stderr

@@ -21,6 +21,8 @@ STEP = NANO  # ns; stamps further back than this may be a clock set back, others
 LONGEST_FILL = 2 * NANO  # ns, or three periods: a longer pause is a gap, not a hold
 DAY = 86_400 * NANO
 WAIT = 2 * NANO  # ns for the first values of all signals
+FIRST_HOLD = 3 * NANO // 10  # ns without a change before the first held sample: a source that
+# has been changing and pauses for less is more likely held up than at rest
 NAN = math.nan
 Emit = Callable[[int, list[float]], None]
 
@@ -56,6 +58,8 @@ class Joiner:
         self.newest = 0  # source time of the newest value taken in [ns]
         self._period = period
         self._settle = settle
+        self._first_hold = max(settle, FIRST_HOLD)
+        self._holding = False  # the last sample was a held one
         self._step = max(STEP, 3 * period)
         self._emit = emit
         self._expected = sum(1 << slot for slot in signals)
@@ -168,7 +172,7 @@ class Joiner:
             self._close(now)
         if self._group or not self._complete(now) or self._ahead is None:
             return
-        due = now + self._ahead - self._period - self._settle
+        due = self._due(now, self._ahead)
         if not self._last or due - self._last > max(LONGEST_FILL, 3 * self._period):
             newest = max(self._times)
             if newest > due:
@@ -179,6 +183,12 @@ class Joiner:
             return
         while self._last <= due:
             self._send(self._last + self._period, now, held=True)
+            due = self._due(now, self._ahead)
+
+    def _due(self, now: int, ahead: int) -> int:
+        """Return the stamp after which a held sample is due."""
+        rests = self._holding or not self._last
+        return now + ahead - self._period - (self._settle if rests else self._first_hold)
 
     def _close(self, now: int) -> None:
         """End the present sample: fill the time before it, apply it, send it."""
@@ -255,6 +265,7 @@ class Joiner:
         self._last = stamp
         self._first = False
         self._guessed &= held
+        self._holding = held
         self._sent_at = now
         self.tally.samples += 1
         self.tally.held += held

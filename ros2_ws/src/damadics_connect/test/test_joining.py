@@ -108,6 +108,24 @@ def test_every_change_is_judged_once_whatever_the_jitter(jitter):
     assert rig.stamps == sorted(set(rig.stamps))
 
 
+@pytest.mark.parametrize('stall', [0.1, 0.25])
+def test_a_source_that_is_held_up_for_less_than_a_third_of_a_second_loses_nothing(stall):
+    """What it had to tell comes late, in a heap, when others have been told of no change."""
+    rig = Rig(period=0.02, settle=0.08)
+    late = []
+    for n in range(1, 500):
+        rig.now = 5 * NANO + n * NANO // 50
+        late.append(n)
+        if not 200 <= n < 200 + stall * 50:
+            for k in late:
+                for slot in (CV, X1, P1):
+                    rig.joiner.take(slot, DAY0 + k * NANO // 50, float(k), rig.now)
+            late.clear()
+        rig.joiner.look(rig.now)
+    assert rig.stamps == [DAY0 + n * NANO // 50 for n in range(1, 500)]
+    assert [values[X1] for _, values in rig.rows] == list(range(1, 500))
+
+
 def test_a_new_session_doubles_no_sample_and_names_the_gap():
     rig = Rig()
     for t in range(3):

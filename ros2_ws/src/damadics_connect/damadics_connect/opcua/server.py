@@ -118,10 +118,10 @@ class Judgements:
             server.set_identity_tokens([ua.UserNameIdentityToken])
         try:
             spaces = await prepare(server, settings.nodesets)
-        except (ua.UaError, OSError, ValueError, KeyError) as problem:
+        except Exception as problem:  # the library raises what it likes on files of others
             raise ConnectError(
-                f'serve.nodesets: cannot be taken in ({type(problem).__name__}): give the files '
-                'they depend on before them'
+                f'serve.nodesets: cannot be taken in ({type(problem).__name__}): give whole '
+                'files, those that they depend on before them'
             ) from None
         conditions = Conditions(server, self._acknowledge)
         conditions.prepare()

@@ -113,15 +113,16 @@ def why(problem: BaseException) -> str:
     return f'{type(problem).__name__}: the server broke the session off'
 
 
-async def open_session(endpoint: Endpoint) -> Client:
+async def open_session(endpoint: Endpoint, patience: float = PATIENCE) -> Client:
     """
     Connect, secure the channel and activate a session.
 
     :param endpoint: the server.
+    :param patience: time that each answer may take [s].
     :return: a connected client, to be closed with `close_session`.
     :raises SessionError: with cause and remedy.
     """
-    client = Client(endpoint.url, timeout=PATIENCE)
+    client = Client(endpoint.url, timeout=patience)
     client.name = client.description = 'DAMADICS FD'
     client.application_uri = APPLICATION
     security = endpoint.security

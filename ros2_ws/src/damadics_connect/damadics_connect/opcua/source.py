@@ -5,7 +5,6 @@
 import asyncio
 import time
 from collections.abc import Callable, Sequence
-from datetime import datetime
 from functools import partial
 
 from asyncua import Client, ua
@@ -16,27 +15,24 @@ from damadics_connect.health import report, some
 from damadics_connect.opcua.feed import Feed, Item, Options
 from damadics_connect.opcua.node_ids import nanoseconds_of, node_of
 from damadics_connect.opcua.session import (
+    PATIENCE,
     Endpoint,
     SessionError,
     close_session,
     open_session,
     why,
 )
-from damadics_connect.opcua.values import status_of
 from damadics_connect.opcua.wire import Changes, WireError, read_changes
 from damadics_connect.publishing import Output
 from damadics_connect.settings import shown
 from damadics_connect.valve_list import ValveSource
 
-KEEP_ALIVE = 0.5  # s between two words of a server that has nothing new
 HELD_UP = 0.5  # s that our own process may be late before its lateness counts
 QUIET = 1.2  # s without a word after which the session counts as lost
 PAUSES = (0.2, 0.5, 1.0, 2.0, 5.0)  # s before it is tried again
 AT_ONCE = 1000  # monitored items of one request
 CANNOT_SUBSCRIBE = (ua.uaerrors.BadServiceUnsupported, ua.uaerrors.BadNotImplemented)
-QUALITY = 0xC0000000  # the two bits of a status code that say good, uncertain or bad
-UNCERTAIN, BAD = 0x40000000, 0x80000000
-OVERFLOW = 0x480  # of a data value: the server's queue was too short
+BAD = 0x80000000
 Log = Callable[[str], None]
 
 
@@ -68,21 +64,20 @@ class Source:
             by_period.setdefault(valve.period, {})[number] = valve
         self._feeds = [Feed(period, group, options, output) for period, group in by_period.items()]
         self._joiners = {n: joiner for feed in self._feeds for n, joiner in feed.joiners.items()}
-        self._heard = 0.0  # monotonic time of the server's last word
         self._ended = False  # the server has ended a subscription
         self._fault = 'not connected yet'
         self._unknown: dict[str, str] = {}
-        self._sessions = self._values = self._lost = self._garbled = 0
+        self._sessions = self._values = self._garbled = 0
 
     async def run(self) -> None:
         """Follow the server for ever; connect again whenever it was lost."""
         failures = 0
         while True:
             try:
-                client = await open_session(self._endpoint)
+                # more patience each time: the server may only be slow
+                client = await open_session(self._endpoint, PATIENCE * 2 ** min(failures, 3))
                 try:
                     self._sessions += 1
-                    failures = 0
                     await self._follow(client)
                 finally:
                     await close_session(client)
@@ -90,6 +85,8 @@ class Source:
                 reason = str(problem)
             except (ua.UaError, OSError, TimeoutError) as problem:
                 reason = f'{shown(self._endpoint.url)}: {why(problem)}'
+            if not self._fault:
+                failures = 0  # it was followed until now
             if reason != self._fault:
                 self._log(f'not connected: {reason}')
             self._fault = reason
@@ -103,7 +100,7 @@ class Source:
             'Connected': not self._fault,
             'Sessions': self._sessions,
             'Values': self._values,
-            'Values lost by the server': self._lost,
+            'Values lost by the server': sum(feed.lost for feed in self._feeds),
             'Unreadable messages': self._garbled,
         }
         unknown = [f'{node} ({cause})' for node, cause in self._unknown.items()]
@@ -112,15 +109,12 @@ class Source:
 
     async def _follow(self, client: Client) -> None:
         """Subscribe to everything, then look after it until the server falls silent."""
-        self._heard = time.monotonic()
         self._ended = False
         self._unknown.clear()
         spaces = await client.get_namespace_array()
         polled = []
         for feed in self._feeds:
-            now = time.monotonic_ns()
-            for joiner in feed.joiners.values():
-                joiner.begin(now)
+            feed.begin(time.monotonic_ns())
             if self._poll or not await self._subscribe(client, feed, spaces):
                 polled.append(asyncio.create_task(self._read_on(client, feed, spaces)))
         self._fault = ''
@@ -135,22 +129,24 @@ class Source:
                 await asyncio.sleep(tick)
                 held_up = time.monotonic() - asleep - tick
                 if held_up > HELD_UP:
-                    self._heard += held_up  # it is us who were: what has come waits to be read
+                    for feed in self._feeds:
+                        feed.heard += held_up  # it is us who were: what has come waits to be read
                 if self._ended:
                     raise SessionError(
                         f'{shown(self._endpoint.url)}: the server has ended our subscription'
                     )
-                silent = time.monotonic() - self._heard
-                if silent > QUIET + max(feed.interval for feed in self._feeds):
-                    raise SessionError(
-                        f'{shown(self._endpoint.url)}: silent for {silent:.1f} s: server or '
-                        'network is gone'
-                    )
+                for feed in self._feeds:
+                    silent = time.monotonic() - feed.heard
+                    if silent > QUIET + max(feed.interval, feed.patience):
+                        raise SessionError(
+                            f'{shown(self._endpoint.url)}: silent for {silent:.1f} s: server or '
+                            'network is gone'
+                        )
                 for task in polled:
                     if task.done():
                         task.result()
                 for number, feed in enumerate(self._feeds):
-                    if (moment := time.monotonic()) >= due[number]:
+                    if not feed.prompt and (moment := time.monotonic()) >= due[number]:
                         due[number] = moment + feed.tick
                         feed.look(time.monotonic_ns())
                 self._output.flush()
@@ -162,7 +158,7 @@ class Source:
         """Make the subscription of a feed; False where the server has none."""
         parameters = ua.CreateSubscriptionParameters(
             RequestedPublishingInterval=1000.0 * feed.interval,
-            RequestedMaxKeepAliveCount=max(1, round(KEEP_ALIVE / feed.interval)),
+            RequestedMaxKeepAliveCount=max(1, round(feed.word / feed.interval)),
             RequestedLifetimeCount=max(30, round(30.0 / feed.interval)),
             MaxNotificationsPerPublish=0,
             PublishingEnabled=True,
@@ -173,6 +169,7 @@ class Source:
         except CANNOT_SUBSCRIBE:
             self._log('the server has no subscriptions: its values are read')
             return False
+        feed.patience = created.RevisedPublishingInterval * created.RevisedMaxKeepAliveCount / 1e3
         requests = []
         for handle, (item, node) in enumerate(zip(feed.items, feed.nodes, strict=True)):
             nodeid = node_of(node, spaces)
@@ -213,54 +210,30 @@ class Source:
 
     async def _take(self, feed: Feed, result: ua.PublishResult) -> None:
         """Take one message of a subscription."""
-        self._heard = time.monotonic()
+        now = time.monotonic_ns()
+        found = []
         for notification in result.NotificationMessage.NotificationData or ():
             if isinstance(notification, ua.ExtensionObject):
                 try:
-                    changes = read_changes(notification.Body or b'')
+                    found.append(read_changes(notification.Body or b''))
                 except WireError:
                     self._garbled += 1
-                    continue
-                self._take_changes(feed, changes, result.NotificationMessage.PublishTime)
             elif isinstance(notification, ua.StatusChangeNotification):
                 self._ended = True
+        published = nanoseconds_of(result.NotificationMessage.PublishTime)
+        self._take_changes(feed, found, published, now, all_of=not result.MoreNotifications)
 
-    def _take_changes(self, feed: Feed, changes: Changes, server: datetime | None) -> None:
-        now = time.monotonic_ns()
-        wall = nanoseconds_of(server) or time.time_ns()
-        for joiner in feed.joiners.values():
-            joiner.source_clock(wall, now)
-        self._values += len(changes.handle)
-        order: Sequence[int] = range(len(changes.stamp))
-        if any(a > b for a, b in zip(changes.stamp, changes.stamp[1:], strict=False)):
-            order = sorted(order, key=changes.stamp.__getitem__)
-        items = feed.items
-        for n in order:
-            item = items[changes.handle[n]]
-            status, value = changes.status[n], changes.value[n]
-            if status or changes.kind[n]:
-                value = self._judge(item, status, value, changes.kind[n])
-            elif item.joiner.tally.bad:
-                item.joiner.tally.bad.pop(SIGNALS[item.slot], None)
-            item.joiner.take(item.slot, changes.stamp[n] or wall, item.scale(value), now)
-        feed.look(now)
+    def _take_changes(
+        self, feed: Feed, found: Sequence[Changes], published: int, now: int, *, all_of: bool
+    ) -> None:
+        """Take what has changed, if anything has; send what is due, if `all_of` it has come."""
+        at = feed.hear(published, now)
+        for changes in found:
+            self._values += len(changes.handle)
+            feed.take(changes, published or time.time_ns(), at)
+        if all_of:
+            feed.look(at)
         self._output.flush()
-
-    def _judge(self, item: Item, status: int, value: float, kind: str) -> float:
-        """Return a value by its quality: NaN for a bad one or for what is no number."""
-        tally, name = item.joiner.tally, SIGNALS[item.slot]
-        self._lost += status & OVERFLOW == OVERFLOW
-        quality = status & QUALITY
-        if quality == UNCERTAIN:
-            tally.uncertain[name] = tally.uncertain.get(name, 0) + 1
-        if quality not in (0, UNCERTAIN):
-            tally.bad[name] = status_of(status).name
-            return float('nan')
-        if kind:
-            tally.bad[name] = f'{kind} where a number is expected'
-            return float('nan')
-        tally.bad.pop(name, None)
-        return value
 
     async def _read_on(self, client: Client, feed: Feed, spaces: list[str]) -> None:
         """Read the values of a feed once a period, for servers without subscriptions."""
@@ -269,10 +242,11 @@ class Source:
             TimestampsToReturn=ua.TimestampsToReturn.Both,
             NodesToRead=[ua.ReadValueId(NodeId=i, AttributeId=ua.AttributeIds.Value) for i in ids],
         )
+        feed.patience = feed.period
         due = time.monotonic()
         while True:
             results = await client.uaclient.session.read(request)
-            self._heard = time.monotonic()
+            now = time.monotonic_ns()
             changes = Changes([], [], [], [], [])
             for handle, result in enumerate(results):
                 value = result.Value.Value if result.Value is not None else None
@@ -287,6 +261,6 @@ class Source:
                     stamp,
                     '' if number else type(value).__name__,
                 )
-            self._take_changes(feed, changes, None)
+            self._take_changes(feed, [changes], 0, now, all_of=True)
             due = max(due + feed.period, time.monotonic() - feed.period)
             await asyncio.sleep(max(0.0, due - time.monotonic()))

@@ -1,0 +1,54 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""How far the word of a subscription reaches: what has changed before has been sent."""
+
+NANO = 1_000_000_000
+WINDOW = 30 * NANO  # ns; the least delay of two of them counts
+
+
+class Horizon:
+    """
+    A clock that stands still while server, network or this process are held up.
+
+    That nothing has changed is known up to the instant at which the newest message was put
+    together, not up to now: what was written since may still be on its way. The server states
+    that instant; on our own clock it is now, less what the message was delayed by beyond the
+    least delay of late.
+    """
+
+    def __init__(self) -> None:
+        self._at = 0
+        self._offset: int | None = None  # server's clock less ours, at the least delay
+        self._lately: int | None = None  # the same in the present window
+        self._window = self._published = 0
+
+    def begin(self, now: int) -> None:
+        """
+        Begin a session.
+
+        :param now: time of a clock that nobody sets [ns].
+        """
+        self._at, self._window, self._published = now, now, 0
+        self._offset = self._lately = None
+
+    def heard(self, published: int, now: int) -> int:
+        """
+        Take a message of the subscription.
+
+        :param published: when the server put it together [ns]; 0 where it does not say so.
+        :param now: when it came, as for `begin` [ns].
+        :return: up to when all that has changed is known, on the clock of `now`; never back.
+        """
+        if not published:
+            self._at = max(self._at, now)
+            return self._at
+        offset = published - now
+        if published < self._published:  # the server's clock was set back
+            self._offset = self._lately = None
+        self._published = published
+        if now - self._window > WINDOW:
+            self._offset, self._lately, self._window = self._lately, None, now
+        self._lately = offset if self._lately is None else max(self._lately, offset)
+        self._offset = self._lately if self._offset is None else max(self._offset, offset)
+        self._at = max(self._at, published - self._offset)
+        return self._at
