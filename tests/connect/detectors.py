@@ -26,6 +26,7 @@ class Detectors:
         self.calls: list[tuple] = []
         self.flags = {}
         self._topics = {}
+        self._frozen: set[str] = set()
         for valve in valves:
             self._topics[valve] = (
                 self.node.create_publisher(FaultFlag, f'/{valve}/fault_flag', qos.FLAG),
@@ -70,6 +71,10 @@ class Detectors:
         self._repeat()
         return stamp
 
+    def freeze(self, valve: str, frozen: bool = True) -> None:
+        """Go on repeating the flag of a valve with the stamp that it has, or end that."""
+        (self._frozen.add if frozen else self._frozen.discard)(valve)
+
     def silence(self) -> None:
         """Stop repeating the flags, as detectors that have died."""
         self.flags = {}
@@ -94,7 +99,8 @@ class Detectors:
 
     def _repeat(self) -> None:
         for valve, flag in self.flags.items():
-            flag.header.stamp.sec, flag.header.stamp.nanosec = divmod(time.time_ns(), NANO)
+            if valve not in self._frozen:
+                flag.header.stamp.sec, flag.header.stamp.nanosec = divmod(time.time_ns(), NANO)
             self._topics[valve][0].publish(flag)
 
     def _serve(self, kind, valve: str, name: str) -> None:

@@ -121,6 +121,11 @@ def test_json_events_actions_and_metrics_of_an_alarm(served):
     )
     again.close()
 
+    detectors.freeze('lv102')  # its detector repeats "healthy", and judges nothing any more
+    assert wait_for(lambda: client.get('/api/valves/lv102').json()['state'] == 'not_monitored')
+    detectors.freeze('lv102', False)
+    assert wait_for(lambda: client.get('/api/valves/lv102').json()['state'] == 'healthy')
+
     families = {f.name: f for f in text_string_to_metric_families(client.get('/metrics').text)}
     ratio = {s.labels['valve']: s.value for s in families['damadics_ratio'].samples}
     assert ratio['lv101'] == 2.0 and ratio['lv102'] == pytest.approx(0.1)

@@ -3,6 +3,7 @@
 """Signals from a real OPC UA server in another process: time, quality, loss, bad input."""
 
 import math
+import os
 import signal
 import subprocess
 import time
@@ -167,12 +168,16 @@ def test_a_server_that_is_read_gives_the_same_samples(connect, serve):
     assert (np.diff(stamps(c.samples['lv0'])) > 0).all()
 
 
-def test_many_valves_in_blocks_every_change_with_its_time(connect, serve):
+def test_many_valves_in_blocks_every_change_with_its_time(connect, serve, processes):
     server = serve(20, '--rate', '1', '--fast', '2')
     valves = {f'lv{n}': valve(n, period=1.0 if n < 20 else 0.02) for n in range(22)}
     c = connect({'server': url(server), 'publish': 'blocks', 'valves': valves})
     assert c.wait(lambda: sum(len(block.valve) for block in c.blocks) > 300), c.log()
-    c.wait(lambda: False, 3.0)
+    for hold in (server.signal, lambda number: os.kill(processes.pid('opcua'), number)):
+        hold(signal.SIGSTOP)  # a busy machine holds a server up, or the connector
+        c.wait(lambda: False, 0.4)
+        hold(signal.SIGCONT)
+        c.wait(lambda: False, 1.5)
     layout = c.layouts[-1]
     assert layout.valve[3] == '/lv3' and layout.actuator[3] == 'LV-3'
     rows = {}
@@ -185,6 +190,8 @@ def test_many_valves_in_blocks_every_change_with_its_time(connect, serve):
         assert len(mine) > 3
         assert (np.diff(mine) == period).all(), 'no change is lost, no time is rounded'
         assert (mine % period == 0).all()
+        taken = [rows[n][stamp] for stamp in mine.tolist()]
+        assert (np.diff(taken) != 0.0).all(), 'a value was held that had changed'
     assert (
         'lost by the server' in str(c.values().keys())
         and c.values()['Values lost by the server'] == '0'

@@ -13,6 +13,7 @@ from damadics_msgs.msg import FaultEvent, FaultFlag, FleetEvent, FleetLayout, Fl
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
+from damadics_connect.ages import Ages
 from damadics_connect.judgement import (
     STATES,
     Judgement,
@@ -59,6 +60,7 @@ class Watch:
         self._seen: set[tuple[str, int, int, str]] = set()
         self._met: set[str] = set()
         self._layouts: dict[int, FleetLayout] = {}
+        self._ages = Ages()  # of those with a flag of their own
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         node.create_timer(LOOK_AROUND, self._look_around, clock=steady)
         node.create_timer(LOOK, self._look, clock=steady)
@@ -91,8 +93,11 @@ class Watch:
         self._met.add(name)
 
         def take_flag(message: FaultFlag) -> None:
-            before = self.valves.get(name, Judgement(name))
-            self._change(with_flag(before, message, time.monotonic()))
+            now = time.monotonic()
+            judgement = with_flag(self.valves.get(name, Judgement(name)), message, now)
+            self._ages.heard(name, judgement.stamp, now)
+            old = self._ages.old(name, self._node.get_clock().now().nanoseconds, now)
+            self._change(judgement.silent() if old else judgement)
 
         def take_event(message: FaultEvent) -> None:
             self._take_event(transition_of(name, message))
@@ -154,10 +159,12 @@ class Watch:
         self._on_event(event)
 
     def _look(self) -> None:
-        """Turn to "not monitored" what nobody has repeated."""
-        now = time.monotonic()
+        """Turn to "not monitored" what nobody has repeated, or what rests on an old sample."""
+        now, clock = time.monotonic(), self._node.get_clock().now().nanoseconds
         for judgement in list(self.valves.values()):
-            if judgement.state != 'not_monitored' and now - judgement.heard > SILENT:
+            if judgement.state != 'not_monitored' and (
+                now - judgement.heard > SILENT or self._ages.old(judgement.valve, clock, now)
+            ):
                 self._change(judgement.silent())
 
     def _change(self, judgement: Judgement) -> None:
