@@ -18,8 +18,6 @@ from damadics_fd.commands import verify
 from .bag_support import MEASUREMENT, needs_messages, replayed, stroke
 from .test_damage import SCHEMA
 
-pytestmark = pytest.mark.plain
-
 N = 300
 MODES = ('sized', 'unsized', 'streamed')
 
@@ -78,6 +76,7 @@ def bag(folder: Path, payloads: list[bytes], storage: str) -> Path:
     return folder
 
 
+@pytest.mark.plain
 @pytest.mark.parametrize('mode', MODES)
 def test_an_mcap_of_compressed_messages_is_read_and_recovered(mode, tmp_path):
     path = bag(tmp_path / 'bag', [packed(message(i), mode) for i in range(N)], 'mcap')
@@ -96,6 +95,7 @@ def test_an_mcap_of_compressed_messages_is_read_and_recovered(mode, tmp_path):
     assert found == [message(i) for i in range(N)]
 
 
+@pytest.mark.plain
 @pytest.mark.parametrize('mode', MODES)
 @needs_messages
 def test_an_sqlite_bag_of_compressed_messages_is_read(mode, tmp_path):
@@ -105,6 +105,7 @@ def test_an_sqlite_bag_of_compressed_messages_is_read(mode, tmp_path):
     assert read_columns(path, '/measurement')['data'].tolist() == [i / 4 for i in range(N)]
 
 
+@pytest.mark.plain
 @pytest.mark.parametrize('storage', ['mcap', 'sqlite3'])
 def test_damaged_messages_among_compressed_ones_are_told_and_left_out(storage, tmp_path):
     payloads = [packed(message(i), 'sized') for i in range(N)]

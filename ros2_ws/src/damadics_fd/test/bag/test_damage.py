@@ -20,8 +20,6 @@ from damadics_fd.bag.salvage import salvage
 from damadics_fd.commands.recover import main as recover
 from damadics_fd.commands.verify import main as verify
 
-pytestmark = pytest.mark.plain
-
 SCHEMA = (
     b'std_msgs/Header header\nfloat64 x1\n'
     + b'=' * 80
@@ -89,6 +87,7 @@ def seconds(path: Path) -> list[int]:
         return []
 
 
+@pytest.mark.plain
 def test_a_whole_bag_is_whole(tmp_path):
     small_bag(tmp_path / 'a.mcap')
     report = inspect(tmp_path / 'a.mcap')
@@ -241,12 +240,14 @@ def test_hostile_files_cost_bounded_memory_and_time(tmp_path, name):
             read_columns(tmp_path / 'bad.mcap')
 
 
+@pytest.mark.plain
 @pytest.mark.parametrize('index', [True, False])
 def test_bags_with_and_without_message_index_are_whole(tmp_path, index):
     small_bag(tmp_path / 'a.mcap', index=index)
     assert inspect(tmp_path / 'a.mcap').code == WHOLE
 
 
+@pytest.mark.plain
 def test_stamps_that_go_back_or_roll_over_are_told(tmp_path):
     for name, times in {'back': [1, 2, 1], 'over': [1, 2, -5]}.items():
         data = messages(0, 3)
@@ -263,6 +264,7 @@ def test_stamps_that_go_back_or_roll_over_are_told(tmp_path):
         assert 'stamps go back 1 times' in str(report.problems)
 
 
+@pytest.mark.plain
 def test_directories_are_recovered_with_metadata(tmp_path):
     with BagWriter(tmp_path / 'bag', split_seconds=1.0) as bag:
         topic = bag.add_topic('/a', 'std_msgs/msg/Float64')
@@ -277,6 +279,7 @@ def test_directories_are_recovered_with_metadata(tmp_path):
     assert 'version: 9' in (tmp_path / 'saved' / 'metadata.yaml').read_text()
 
 
+@pytest.mark.plain
 @pytest.mark.parametrize('content', [b'', b'nonsense' * 100, MAGIC, MAGIC + MAGIC])
 def test_files_without_anything_are_unusable(tmp_path, content, capsys):
     (tmp_path / 'a.mcap').write_bytes(content)

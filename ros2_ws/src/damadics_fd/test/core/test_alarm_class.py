@@ -25,8 +25,6 @@ from damadics_fd.core.signature.state import CAUSES
 
 from .test_alarm import Valve
 
-pytestmark = pytest.mark.plain
-
 SPRING = CAUSES.index('spring_softer')
 FRICTION = CAUSES.index('friction_up')
 
@@ -42,6 +40,7 @@ def alarmed(cause: int, value: float, classes=None, ratio: float = 1.2) -> Valve
     return valve
 
 
+@pytest.mark.plain
 def test_the_class_is_the_worse_of_residual_and_cause():
     valve = alarmed(SPRING, -0.3)
     assert valve.detector.decision.level == OUT_OF_SPECIFICATION
@@ -54,6 +53,7 @@ def test_the_class_is_the_worse_of_residual_and_cause():
     assert severe.detector.decision.level == FAILURE, 'the cause hid the size of the residual'
 
 
+@pytest.mark.plain
 def test_the_table_of_the_user_decides():
     classes = list(load_causes().classes)
     classes[FRICTION] = FAILURE
@@ -64,6 +64,7 @@ def test_the_table_of_the_user_decides():
         SignatureSettings(ne107=(0, 1))
 
 
+@pytest.mark.plain
 def test_a_shelved_alarm_is_a_function_check_whatever_its_cause():
     valve = alarmed(SPRING, -0.3)
     (event,) = valve.detector.shelve(60.0).events

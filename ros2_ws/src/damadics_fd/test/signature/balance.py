@@ -23,6 +23,21 @@ QUICK = SignatureSettings(
 )
 
 
+def chamber_pressure(c, x, v, dp, dK=0.0, dF=0.0, preload=0.0, held=0.0, table=None):
+    """
+    Return what the force balance asks for [Pa].
+
+    :param dK: change of stiffness, one number or one for each sample; so are the following.
+    :param held: force / FN that the stem bears besides.
+    :param table: Km(X) of the plug, if not that of the settings.
+    """
+    table = c.plug_km if table is None else table
+    plug = dp * c.plug_area / recoveries(table, x) / c.force_scale
+    friction = (0.0246 * v + 0.0108 * np.tanh(v / 0.004)) * (1.0 + dF)
+    u = (1.0 + dK) * (x + c.preload) + preload + friction + held
+    return (u - c.weight / c.force_scale + plug) * c.force_scale / c.diaphragm_area
+
+
 class Strokes:
     """Records of a valve that strokes between random places at random speeds."""
 
@@ -65,11 +80,8 @@ class Strokes:
         self.t += len(x) * DT
         v = np.gradient(x, DT)
         dp = 0.9e6 * (1.0 + 0.04 * np.sin(0.6 * t))
-        plug = dp * c.plug_area / recoveries(c.plug_km, x) / c.force_scale
-        friction = (0.0246 * v + 0.0108 * np.tanh(v / 0.004)) * (1.0 + dF)
-        u = (1.0 + dK) * (x + c.preload) + preload + friction
-        u = u + held * np.where(np.abs(v) < 1e-6, np.sin(4.0 * t), 0.0)
-        ps = (u - c.weight / c.force_scale + plug) * c.force_scale / c.diaphragm_area
+        stuck = held * np.where(np.abs(v) < 1e-6, np.sin(4.0 * t), 0.0)
+        ps = chamber_pressure(c, x, v, dp, dK, dF, preload, stuck)
         x = x * (1.0 + gain) + 7e-4 * rng.standard_normal(len(x))
         ps = ps * (1.0 + pressure) + 80.0 * rng.standard_normal(len(x))
         stamp = np.round(t * 1e9).astype(np.int64)

@@ -21,6 +21,7 @@ from damadics_fd.core.signature.state import CAUSES
 from damadics_fd.core.signature.step import BLOCK, CHANGED, QUIET
 from damadics_fd.core.valve.plug import POSITION, recoveries
 
+from .balance import chamber_pressure
 from .feed import feed
 
 DT = 0.005
@@ -68,10 +69,7 @@ def valve(
     v = np.gradient(x, DT)
     dp = 0.9e6 * (1.0 + 0.04 * np.sin(0.6 * t))
     table = np.asarray(C.plug_km) / (1.0 + gain + shape * np.sin(5.0 * np.asarray(POSITION)))
-    plug = dp * C.plug_area / recoveries(table, x) / C.force_scale
-    friction = (0.0246 * v + 0.0108 * np.tanh(v / 0.004)) * (1.0 + dF * after)
-    u = (1.0 + dK * after) * (x + C.preload) + preload * after + friction
-    ps = (u - C.weight / C.force_scale + plug) * C.force_scale / C.diaphragm_area
+    ps = chamber_pressure(C, x, v, dp, dK * after, dF * after, preload * after, table=table)
     x = x * (1.0 + position[0] * after) + position[1] * after
     x = x + 1.41e-3 * rng.standard_normal(len(x)) + 2.5e-3 * np.sin(2 * np.pi * 50.0 * t)
     ps = ps * (1.0 + pressure * after) + 80.0 * rng.standard_normal(len(x))
