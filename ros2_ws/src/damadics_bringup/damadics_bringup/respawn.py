@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 from damadics_bringup.keeper import USAGE
 
 if TYPE_CHECKING:  # launch comes with an installed ROS 2 only
-    from launch import LaunchContext
     from launch.actions import EmitEvent
     from launch.events.process import ProcessExited
+    from launch.launch_context import LaunchContext
 
 
 def unless_refused(event: 'ProcessExited', context: 'LaunchContext') -> 'list[EmitEvent]':
