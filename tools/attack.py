@@ -75,19 +75,19 @@ def put(file: Path, data: bytes | None) -> None:
 
 def attack_files(prey: Prey, count: int) -> None:
     """Damage what is kept, configure the nodes anew, look at the first flag."""
-    alarms = prey.folder / 'alarms'
-    prey.start('estimator', reference=str(prey.folder / 'reference'))
-    prey.start('detector', alarm_folder=str(alarms), signature_folder=str(alarms / 'signature'))
+    folders = folders_of(prey)
+    alarms = prey.folder / 'kept'
+    prey.start('estimator', **folders['estimator'])
+    prey.start('detector', **folders['detector'])
     assert prey.spin(300.0, lambda: bool(prey.flags)), 'the detector does not start'
-    for _ in range(60):
-        if prey.drive(1.0, True, lambda: prey.flags[-1].fault):
-            break
-    assert prey.flags[-1].fault, 'there is no alarm to lose'
-    prey.drive(2.0)
+    assert prey.has_alarm(), 'there is no alarm to lose'
     wanted = prey.flags[-1].occurrence
     kept = {f: f.read_bytes() for f in alarms.rglob('*') if f.is_file()}
-    prey.transit('detector', DEACTIVATE)
-    prey.transit('detector', CLEANUP)
+    print('kept:', *sorted(f.relative_to(alarms) for f in kept), flush=True)
+    nodes = ('estimator', 'detector')
+    for node in nodes:
+        prey.transit(node, DEACTIVATE)
+        prey.transit(node, CLEANUP)
     for n in range(count):
         for file in [f for f in alarms.rglob('*') if '.bad-' in f.name]:
             file.rmdir() if file.is_dir() else file.unlink()
@@ -97,7 +97,7 @@ def attack_files(prey: Prey, count: int) -> None:
         for file in chosen:
             put(file, mutated(kept[file], prey.random))
         before = len(prey.flags)
-        if not prey.transit('detector', CONFIGURE):
+        if not all([prey.transit(node, CONFIGURE) for node in nodes]):
             prey.found['not configured'] += 1
         elif not prey.spin(5.0, lambda b=before: len(prey.flags) > b):
             prey.found['no flag'] += 1
@@ -108,13 +108,24 @@ def attack_files(prey: Prey, count: int) -> None:
                 prey.found['lost alarm'] += 1
                 print('lost:', n, flag.state, flag.fault, flag.occurrence, flush=True)
             prey.found['shown as unknown' if flag.state == UNKNOWN else 'kept'] += 1
-        prey.transit('detector', CLEANUP)
+        for node in nodes:
+            prey.transit(node, CLEANUP)
         if prey.ended():
             prey.found['process ended'] += 1
             print('ended:', n, prey.ended(), flush=True)
             return
-    prey.transit('detector', CONFIGURE)
-    prey.transit('detector', ACTIVATE)
+    for node in nodes:
+        prey.transit(node, CONFIGURE)
+        prey.transit(node, ACTIVATE)
+
+
+def folders_of(prey: Prey) -> dict[str, dict[str, str]]:
+    """Return the parameters that say where the nodes keep what survives them."""
+    kept = prey.folder / 'kept'
+    return {
+        'estimator': {'reference': str(kept / 'reference')},
+        'detector': {'alarm_folder': str(kept), 'signature_folder': str(kept / 'signature')},
+    }
 
 
 def text(chance: random.Random) -> str:
@@ -166,7 +177,6 @@ def attack_services(prey: Prey, count: int) -> None:
 
 def attack_signals(prey: Prey, count: int) -> None:
     """Stop and kill nodes at random times; look for an old judgement that is called healthy."""
-    alarms = str(prey.folder / 'alarms')
     chance = prey.random
     old_since = 0.0
     worst = 0.0
@@ -184,7 +194,14 @@ def attack_signals(prey: Prey, count: int) -> None:
                 old_since = 0.0
         seen = len(prey.flags)
 
-    for _ in range(count):
+    prey.call(ResetAlarm, 'reset')
+    prey.call(Shelve, 'shelve')
+    prey.hurry(300.0, lambda: prey.flags[-1].state == HEALTHY)
+    for n in range(count):
+        prey.valve.faulty = n % 16 >= 12
+        if n % 16 == 0:
+            prey.call(ResetAlarm, 'reset', drive=True)
+        prey.found['seen ' + ('with an alarm' if prey.flags[-1].fault else 'without one')] += 1
         name = chance.choice(('estimator', 'detector'))
         process = prey.processes[name]
         if chance.random() < 0.5:
@@ -195,8 +212,7 @@ def attack_signals(prey: Prey, count: int) -> None:
             fault = prey.flags[-1].fault
             process.kill()
             process.wait()
-            folders = {'alarm_folder': alarms} if name == 'detector' else {}
-            prey.start(name, **folders)
+            prey.start(name, **folders_of(prey)[name])
             before = len(prey.flags)
             if name == 'detector':
                 prey.drive(60.0, until=lambda b=before: len(prey.flags) > b)
@@ -233,13 +249,14 @@ def main() -> int:
     p.add_argument('--signals', type=int, default=200, help='SIGSTOP and SIGKILL (200)')
     p.add_argument('--pages', type=int, default=500, help='malformed requests to the page (500)')
     p.add_argument('--histories', type=int, default=500, help='damaged histories (500)')
+    p.add_argument('--mode', choices=('paper', 'monitor'), default='monitor', help='of the nodes')
     p.add_argument('--seed', type=int, default=1)
     options = p.parse_args()
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     os.environ.setdefault('ROS_DOMAIN_ID', str(random.SystemRandom().randint(1, 99)))
     with tempfile.TemporaryDirectory() as folder:
         rclpy.init()
-        prey = Prey(Path(folder), options.seed)
+        prey = Prey(Path(folder), options.seed, options.mode)
         try:
             attack_history(prey.folder, options.histories, prey.random, prey.found)
             attack_page(prey.folder, options.pages, prey.random, prey.found)

@@ -233,3 +233,26 @@ def test_all_mistakes_in_the_parameters_are_listed(domain, name):
         "decide_m: 'two' is not",
     ):
         assert cause in done.stderr
+
+
+@pytest.mark.parametrize(
+    ('words', 'says'),
+    [
+        (['-p', 'use_sim_time:=5'], 'use_sim_time'),
+        (['--params-file', 'nofile.yaml'], 'nofile.yaml'),
+        (['-r', '__ns:=not a name'], 'not a name'),
+    ],
+    ids=['use_sim_time', 'no file', 'namespace'],
+)
+@pytest.mark.parametrize('name', ['detector', 'plant'])
+def test_what_ros_itself_refuses_is_one_line_and_no_restart(domain, name, words, says):
+    package = 'damadics_plant' if name == 'plant' else 'damadics_fd'
+    done = subprocess.run(
+        [executable(package, name), '--ros-args', *words],
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert done.returncode == 2, done.stderr
+    assert says in done.stderr
+    assert 'Traceback' not in done.stderr and len(done.stderr.splitlines()) <= 5

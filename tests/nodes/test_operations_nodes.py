@@ -13,7 +13,13 @@ from damadics_bringup.policy import policy
 from damadics_bringup.processes import Processes, executable, parameters, surroundings
 from damadics_fd.ros import qos
 from damadics_fd.store.fleet_file import Valve as FleetEntry
-from damadics_msgs.msg import FaultEvent, FaultFlag, Measurement, StrokeRequest
+from damadics_msgs.msg import (
+    FaultEvent,
+    FaultFlag,
+    Measurement,
+    OperatorAction,
+    StrokeRequest,
+)
 from damadics_msgs.srv import Acknowledge, PartialStroke, Relearn, ResetAlarm, Shelve
 from driven_valve import SETTINGS, Valve, start
 from lifecycle_msgs.msg import Transition
@@ -106,16 +112,10 @@ def test_a_late_joiner_gets_the_flag_and_all_events(valve):
 
 def test_a_killed_detector_comes_back_with_its_alarm_and_raises_no_other(valve, plant):
     valve.raise_alarm()
-    assert valve.call(Acknowledge, 'acknowledge').success
+    assert valve.call(Acknowledge, 'acknowledge', user='Anna', comment='on my way').success
     valve.run(0.3)
     occurrence = valve.flags[-1].occurrence
-    plant.processes.kill('detector')
-    before = len(valve.flags)
-    plant.processes.start(
-        'damadics_fd', 'detector', parameters(alarm_folder=plant.alarms, **SETTINGS)
-    )
-    assert valve.run_until(lambda: len(valve.flags) > before, patience=30.0)
-    assert valve.flags[before].fault, 'the alarm was lost'
+    assert killed(valve, plant).fault, 'the alarm was lost'
     assert valve.run_until(
         lambda: valve.flags[-1].state == FaultFlag.STATE_LATCHED, patience=30.0
     ), 'the restarted detector does not judge'
@@ -123,6 +123,35 @@ def test_a_killed_detector_comes_back_with_its_alarm_and_raises_no_other(valve, 
     assert valve.flags[-1].occurrence == occurrence, 'the restart raised an alarm'
     again = valve.call(Acknowledge, 'acknowledge')
     assert 'acknowledged before' in again.message
+    acts = valve.peer.listen(OperatorAction, 'operator_action', qos.EVENTS)
+    assert valve.run_until(lambda: any(act.user == 'Anna' and act.success for act in acts)), (
+        'what people did is told to who comes after the restart'
+    )
+
+
+def killed(valve: Valve, plant) -> FaultFlag:
+    """Kill the detector and start it again; return its first flag."""
+    plant.processes.kill('detector')
+    before = len(valve.flags)
+    plant.processes.start(
+        'damadics_fd', 'detector', parameters(alarm_folder=plant.alarms, **SETTINGS)
+    )
+    assert valve.run_until(lambda: len(valve.flags) > before, patience=30.0)
+    return valve.flags[before]
+
+
+def test_an_active_and_a_shelved_alarm_survive_a_kill(valve, plant):
+    valve.run(0.3)
+    assert valve.run_until(lambda: valve.flags[-1].state == FaultFlag.STATE_ALARM, throw=True)
+    occurrence = valve.flags[-1].occurrence
+    first = killed(valve, plant)
+    assert (first.fault, first.occurrence) == (True, occurrence)
+    assert valve.run_until(lambda: valve.flags[-1].state == FaultFlag.STATE_LATCHED)
+    assert valve.call(ResetAlarm, 'reset').success
+    assert valve.call(Shelve, 'shelve', duration=600.0).success
+    assert killed(valve, plant).state != FaultFlag.STATE_HEALTHY
+    assert valve.run_until(lambda: valve.flags[-1].state == FaultFlag.STATE_SHELVED, patience=30.0)
+    assert valve.call(Shelve, 'shelve').success
 
 
 def test_a_killed_estimator_stops_the_monitoring_within_half_a_second(valve, plant):
@@ -172,6 +201,25 @@ def test_parameters_are_checked_before_they_are_applied(valve, plant):
     assert set_parameter(valve, 'detector', 'input_timeout', 2.0).successful
     assert 'changed from 0.5 to 2 s' in plant.processes.log('detector').read_text()
     assert set_parameter(valve, 'detector', 'input_timeout', 0.5).successful
+
+
+def test_hundreds_of_requests_at_once_are_all_answered(valve):
+    kinds = {'acknowledge': Acknowledge, 'reset': ResetAlarm, 'shelve': Shelve}
+    clients = [
+        valve.peer.node.create_client(kind, name, qos_profile=QoSProfile(depth=1000))
+        for name, kind in kinds.items()
+    ]
+    asked = {Shelve: {'duration': -1.0}}
+    assert valve.run_until(lambda: all(client.service_is_ready() for client in clients))
+    futures = [
+        client.call_async(kind.Request(**asked.get(kind, {})))
+        for _ in range(100)
+        for client, kind in zip(clients, kinds.values(), strict=True)
+    ]
+    assert valve.run_until(lambda: all(future.done() for future in futures), patience=30.0), (
+        f'{sum(not future.done() for future in futures)} of 300 requests were not answered'
+    )
+    assert not any(future.result().success for future in futures)
 
 
 def test_an_inactive_node_takes_no_samples_and_says_so(valve):

@@ -48,9 +48,18 @@ def test_what_people_did_is_kept_once_though_page_and_node_tell_it(tmp_path):
     action = {'valve': 'v', 'action': 'reset', 'user': 'Anna', 'role': 'operator'}
     action |= {'comment': 'packing', 'done': 1, 'result': 'reset'}
     assert history.add_action(action)
-    assert not history.add_action({**action, 'role': ''}), 'the node says it again'
+    assert not history.add_action({**action, 'role': ''}, 5), 'the node says it again'
+    assert not history.add_action({**action, 'role': ''}, 5), 'and after its restart'
     assert [row['user'] for row in history.actions()] == ['Anna']
+    assert history.add_action({**action, 'role': ''}, 9), 'she did it again, not on the page'
+    assert history.add_action({**action, 'role': ''}, 12)
     history.close()
+    again = History(tmp_path / 'history.sqlite')
+    assert len(again.actions()) == 3
+    for stamp in (5, 9, 12):
+        assert not again.add_action({**action, 'role': ''}, stamp), 'told to a newcomer'
+    assert again.add_action({**action, 'role': ''}, 15)
+    again.close()
 
 
 def test_a_locked_history_waits_in_memory_and_is_written_later(tmp_path):

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The page against texts that are markup, a server that is gone, and a fleet that is large."""
 
+import io
 import os
 import signal
 import time
@@ -11,6 +12,7 @@ import pytest
 import website
 from conftest import promised
 from damadics_dashboard.words.texts import texts
+from damadics_fd.bag.mcap.writer import McapWriter
 from damadics_fd.ros import qos
 from damadics_msgs.msg import FaultEvent, FaultFlag, Isolation, OperatorAction
 from damadics_msgs.srv import PartialStroke
@@ -120,6 +122,27 @@ def test_the_name_of_a_dropped_file_is_data(hostile, browser, tmp_path):
     page.wait_for_selector('[role=alert] >> text=cannot be replayed', timeout=60_000)
     unharmed(page)
     assert page.locator('.drop input[type=file]').is_enabled()
+    page.close()
+
+
+def test_a_recording_that_cannot_be_replayed_leaves_the_page_as_it_was(site, browser):
+    page = browser.new_page()
+    page.goto(f'{site.address}/replay')
+    for name in ('../../../etc/passwd', 'x', ''):
+        content = io.BytesIO()
+        writer = McapWriter(content)
+        schema = writer.add_schema(name, 'ros2msg', b'float64 cv\nfloat64 x1')
+        channel = writer.add_channel(schema, '/measurement', 'cdr', {})
+        writer.add_message(channel, b'\0\1\0\0' + bytes(16), 1, 1)
+        writer.finish()
+        dropped = {'name': 'a.mcap', 'mimeType': 'x/y', 'buffer': content.getvalue()}
+        page.set_input_files('.drop input[type=file]', files=[dropped])
+        page.wait_for_function(
+            "document.querySelector('.banner') || document.body.innerText.includes('cannot be')",
+            timeout=60_000,
+        )
+        assert page.locator('.drop input[type=file]').is_enabled(), name
+        page.reload()
     page.close()
 
 

@@ -264,7 +264,8 @@ class Watcher:
             self._note_event(name, message)
 
         def take_action(message: OperatorAction) -> None:
-            self.history.add_action(action_row(name, message))
+            stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
+            self.history.add_action(action_row(name, message), stamp)
 
         def take_signature(message: Signature) -> None:
             valve.signature = message

@@ -5,7 +5,7 @@
 import sqlite3
 import threading
 import time
-from collections import Counter, deque
+from collections import Counter, OrderedDict, deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -93,7 +93,9 @@ class History:
                 (MOST_REPEATED,),
             )
         )
-        self._known_actions = Counter(
+        self._told: OrderedDict[tuple[object, ...], None] = OrderedDict()  # by nodes
+        # by whom each act is still to be told a second time: above 0 a node, below 0 the page
+        self._untold = Counter(
             tuple(row)
             for row in self._db.execute(
                 f'SELECT {", ".join(ACTION_IDENTITY)} FROM action ORDER BY rowid DESC LIMIT ?',
@@ -115,18 +117,27 @@ class History:
         self._write('event', {**event, 'seen': time.time()})
         return True
 
-    def add_action(self, action: ActionRow) -> bool:
+    def add_action(self, action: ActionRow, stamp: int | None = None) -> bool:
         """
         Add what a person did, unless it is known: the node tells what the page asked it for.
 
         :param action: values by the names in `ACTION_COLUMNS`, but for `seen`.
+        :param stamp: of the node that tells it [ns]; after its restart it tells all once more.
         :return: whether it is new.
         """
         key = tuple(action.get(name) for name in ACTION_IDENTITY)
-        if self._known_actions[key]:
-            self._known_actions[key] -= 1
+        by_page = stamp is None
+        if not by_page:
+            told = (stamp, action.get('result'), *key)
+            if told in self._told:
+                return False
+            self._told[told] = None
+            if len(self._told) > MOST_REPEATED:
+                self._told.popitem(last=False)
+        untold = self._untold[key]
+        self._untold[key] += 1 if by_page else -1
+        if untold < 0 if by_page else untold > 0:
             return False
-        self._known_actions[key] += 1
         self._write('action', {**action, 'seen': time.time()})
         return True
 

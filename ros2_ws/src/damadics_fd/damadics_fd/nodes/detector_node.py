@@ -123,7 +123,8 @@ class DetectorNode(MonitoringNode):
         if self._memory.restore():
             self._decision = self._core.decision
         self._signature.restore()
-        actions = OperatorActions(self, made, self.actuator)
+        acts = self._alarms / f'{self._valve()}.actions' if self._alarms else None
+        actions = OperatorActions(self, made, self.actuator, acts)
         OperatorServices(made, actions, self._core, self._operated)
         self._strokes = PartialStrokes(
             made, actions, self._core, self._stroke_limits, lambda: self._blind

@@ -86,7 +86,8 @@ class EstimatorNode(MonitoringNode):
         self._judgement: Judgement | None = None
         if self._core.stride:
             self._isolation = made.publisher(Isolation, 'isolation', qos.FLAG)
-        self._actions = OperatorActions(self, made, self.actuator)
+        acts = self._path.with_name(f'{self._path.name}.actions') if self._path else None
+        self._actions = OperatorActions(self, made, self.actuator, acts)
         made.service(Relearn, 'relearn', self._relearn)
         self._reference = ReferenceKeeper(
             self, made, self._actions, self._core, self.actuator, self.settings, self._path

@@ -3,6 +3,7 @@
 """What people ask of a valve's nodes: the services of an operator, and the record of each act."""
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Protocol, TypeVar
 
 from damadics_msgs.msg import OperatorAction
@@ -14,6 +15,7 @@ from damadics_fd.core.text import COMMENT, NAME, SENTENCE, plain
 from damadics_fd.ros import qos
 from damadics_fd.ros.conversions import set_stamp
 from damadics_fd.ros.entities import Entities
+from damadics_fd.store.actions import Act, ActionStore
 
 Told = Callable[[Outcome, str], None]
 Response = TypeVar('Response', bound='Answered')
@@ -35,17 +37,23 @@ class Answered(Protocol):
 
 class OperatorActions:
     """
-    Publisher of `operator_action`: who did what, why, and what came of it.
+    Publisher of `operator_action`: who did what, why, and what came of it; that of before too.
 
     :param node: the node.
     :param entities: of the node.
     :param actuator: tag.
+    :param path: where they are kept, without suffix; None where they are not.
     """
 
-    def __init__(self, node: Node, entities: Entities, actuator: str) -> None:
+    def __init__(self, node: Node, entities: Entities, actuator: str, path: Path | None) -> None:
         self._node = node
         self._actuator = actuator
         self._publisher = entities.publisher(OperatorAction, 'operator_action', qos.EVENTS)
+        self._store = ActionStore(path)
+        for act in self._store.load():
+            self._publish(act)
+        if self._store.problem:
+            node.get_logger().error(self._store.problem)
 
     def tell(
         self,
@@ -78,18 +86,26 @@ class OperatorActions:
             log.info(f'{text}{remark}')
         else:
             log.warning(f'{text}{remark}')
+        act = Act(action, max(stamp, 0), occurrence, user, '', comment, done, text)
+        self._publish(act)
+        self._store.add(act)
+        if self._store.problem:
+            log.error(self._store.problem, throttle_duration_sec=60.0)
+        return remark
+
+    def _publish(self, act: Act) -> None:
         message = OperatorAction(
-            action=action,
-            occurrence=occurrence,
-            user=user,
-            comment=comment,
-            success=done,
-            result=text,
+            action=act.action,
+            occurrence=act.occurrence,
+            user=act.user,
+            role=act.role,
+            comment=act.comment,
+            success=act.done,
+            result=act.result,
         )
         message.header.frame_id = self._actuator
-        set_stamp(message.header.stamp, max(stamp, 0))
+        set_stamp(message.header.stamp, act.stamp)
         self._publisher.publish(message)
-        return remark
 
 
 class OperatorServices:

@@ -91,6 +91,7 @@ class FleetNode(SpinnableNode):
         for name, one in (('alarm_folder', folder), ('state_folder', state)):
             if one and (cause := check_folder(one)):
                 raise StartError(f'fleet cannot keep what it knows: {name}: {cause}')
+        self._acts = folder / 'fleet.actions' if folder else None
         self._keeping = Keeping(self, self._members, folder)
         self._handover = Handover(self, self._members, state, folder)
         self._keeping.restore(self._handover.take())
@@ -120,7 +121,7 @@ class FleetNode(SpinnableNode):
         made = self._entities
         self._layout = made.publisher(FleetLayout, 'fleet/layout', qos.FLAG)
         self._status = made.publisher(FleetStatus, 'fleet/status', qos.FLAG)
-        actions = OperatorActions(self, made, 'fleet')
+        actions = OperatorActions(self, made, 'fleet', self._acts)
         FleetServices(made, actions, self._members, self._keeping, self._tell_all)
         self._diagnostics = Diagnostics(self, made, 'fleet', self._report)
         self._telling.expose(exposed, self._gather)
