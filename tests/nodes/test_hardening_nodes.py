@@ -9,7 +9,9 @@ import time
 import pytest
 from damadics_bringup.launcher import arguments_of
 from damadics_bringup.processes import parameters
+from damadics_fd.nodes import second_publisher
 from damadics_fd.ros import qos
+from damadics_fd.ros.entities import Entities
 from damadics_msgs.msg import Estimate, FaultFlag, OperatorAction
 from damadics_msgs.srv import Acknowledge, Reference, ResetAlarm, Shelve
 from driven_valve import SETTINGS, start
@@ -327,3 +329,22 @@ def test_a_position_frozen_while_the_control_value_moves_is_told_live(processes,
     await_state(valve, HEALTHY)
     valve.run(6.0, swing=True)
     assert valve.run_until(lambda: valve.says('estimator', 'position has not moved'))
+
+
+@pytest.mark.parametrize(('newcomer', 'gives_way'), [(0.0, False), (60.0, True)])
+def test_of_two_detectors_the_first_stays_and_says_that_there_is_another(
+    peer, monkeypatch, newcomer, gives_way
+):
+    """As after SIGSTOP of a detector, start of a second and SIGCONT: both were there first."""
+    monkeypatch.setattr(second_publisher, 'NEWCOMER', newcomer)
+    refused = []
+    entities = Entities(peer.node)
+    rival = second_publisher.RivalWatch(peer.node, entities, refused.append)
+    another = peer.node.create_publisher(FaultFlag, 'fault_flag', qos.FLAG)
+    assert peer.wait(lambda: another.get_subscription_count() > 0)
+    assert not rival.problem
+    another.publish(FaultFlag())
+    assert peer.wait(lambda: rival.problem)
+    assert 'another detector judges this valve too' in rival.problem
+    assert bool(refused) == gives_way
+    entities.release()
