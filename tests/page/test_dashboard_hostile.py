@@ -140,7 +140,7 @@ def test_a_recording_that_cannot_be_replayed_leaves_the_page_as_it_was(site, bro
         refused = '/cannot be replayed/.test(document.body.innerText)'
         done = f"document.querySelector('.banner') || {refused}"
         page.wait_for_function(done, timeout=60_000)
-        assert page.locator('.drop input[type=file]').is_enabled(), name
+        page.wait_for_selector('.drop input[type=file]:enabled', state='attached')
         page.reload()
     page.close()
 

@@ -28,7 +28,7 @@ from damadics_connect.settings import shown
 from damadics_connect.valve_list import ValveSource
 
 HELD_UP = 0.5  # s that our own process may be late before its lateness counts
-QUIET = 1.2  # s without a word after which the session counts as lost
+QUIET = 1.6  # s without a word, beside its usual time, after which the session counts as lost
 PAUSES = (0.2, 0.5, 1.0, 2.0, 5.0)  # s before it is tried again
 AT_ONCE = 1000  # monitored items of one request
 CANNOT_SUBSCRIBE = (ua.uaerrors.BadServiceUnsupported, ua.uaerrors.BadNotImplemented)
