@@ -27,7 +27,6 @@ from lifecycle_msgs.srv import ChangeState
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
 from rclpy.qos import QoSProfile, ReliabilityPolicy
-from rosgraph_msgs.msg import Clock
 
 pytestmark = pytest.mark.ros
 
@@ -246,43 +245,6 @@ def test_a_publisher_with_another_quality_of_service_is_named(processes, peer):
     assert valve.run_until(lambda: valve.says('estimator', 'no measurement'))
     assert valve.report('estimator').level == b'\x02'
     assert valve.flags[-1].state == FaultFlag.STATE_NOT_MONITORING
-
-
-class SimulatedTime:
-    """Publishes /clock with the stamps of the samples."""
-
-    def __init__(self, valve: Valve) -> None:
-        self.valve = valve
-        self.publisher = valve.peer.node.create_publisher(Clock, '/clock', 10)
-
-    def run(self, seconds: float) -> None:
-        end = time.monotonic() + seconds
-        while time.monotonic() < end:
-            clock = Clock()
-            clock.clock.sec, clock.clock.nanosec = divmod(self.valve.stamp, 1_000_000_000)
-            self.publisher.publish(clock)
-            self.valve.run(1e-3)
-
-
-def test_a_pause_and_a_jump_back_of_simulated_time_raise_no_alarm(processes, peer):
-    valve = start(processes, peer, use_sim_time=True)
-    valve.stamp = 50 * 1_000_000_000
-    simulated = SimulatedTime(valve)
-    simulated.run(1.0)
-    assert valve.flags[-1].state == FaultFlag.STATE_HEALTHY
-    peer.wait(lambda: False, 1.2)  # the clock and the samples pause
-    assert valve.flags[-1].state == FaultFlag.STATE_NOT_MONITORING, 'silence is not health'
-    simulated.run(1.0)
-    assert valve.flags[-1].state == FaultFlag.STATE_HEALTHY
-    valve.stamp = 10 * 1_000_000_000  # the bag begins anew
-    simulated.run(1.5)
-    assert valve.flags[-1].state == FaultFlag.STATE_HEALTHY
-    assert valve.flags[-1].header.stamp.sec < 20
-    assert valve.flags[-1].occurrence == 0
-    values = {v.key: v.value for v in valve.report('estimator').values}
-    assert values['Samples clock jumps'] == '1'
-    stamp = valve.reports[-1].header.stamp
-    assert stamp.sec < 60, 'diagnostics carry simulated time'
 
 
 def test_a_sample_a_second_is_no_silence_in_mode_scada(processes, peer):
