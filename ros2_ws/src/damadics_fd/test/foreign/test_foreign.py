@@ -89,6 +89,13 @@ def test_a_foreign_valve_is_watched_without_alarm_and_its_fault_named(change):
         assert np.isnan(t.size) or t.size == pytest.approx(t.true, rel=0.15)
 
 
+def test_a_plug_that_the_flow_slams_shut_raises_no_alarm():
+    build = kinds.random_valve(104, air_to='open', flow_to='close')
+    proposal = commissioned(build, 104)
+    t = trial(build, proposal, 'friction +100 %', 104, quiet=1900.0)
+    assert (t.false_alarms, t.right) == (0, True)
+
+
 def test_stated_deviations_cover_the_truth():
     missed = []
     for seed in range(140, 146):

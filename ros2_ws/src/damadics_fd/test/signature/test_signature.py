@@ -115,6 +115,18 @@ def test_a_change_is_found_named_and_sized(change, cause, truth, tolerance):
     assert view.confidence > 0.95
 
 
+def test_a_block_in_which_the_stem_jumps_and_stops_is_no_steady_motion():
+    t = np.arange(8000) * DT
+    phase = np.mod(t - 0.05, 1.0)  # jumps of 0.08 s that begin and end within a block
+    step = np.clip(phase / 0.08, 0.0, 1.0)
+    up = np.floor(t - 0.05) % 2 == 0
+    x = 0.5 + 0.1 * np.where(up, step, 1.0 - step)
+    ps = (x + C.preload) * C.force_scale / C.diaphragm_area
+    signature, _ = run((np.arange(len(t)) * 5_000_000, x, ps, np.zeros(len(t))))
+    assert signature.state['index'][0] > 300
+    assert (signature.state['n_up'][0], signature.state['n_down'][0]) == (0, 0)
+
+
 def test_a_wrong_plug_force_table_is_learned_and_raises_no_alarm():
     for error in ({'gain': 0.03}, {'gain': -0.03}, {'shape': 0.01}):
         signature, _ = run(valve(seed=4, **error))

@@ -35,7 +35,7 @@ from damadics_fd.core.settings.identified import LIMITED, OK, REFUSED, FaultFree
 from damadics_fd.core.signature.settings import MIN_RATE
 
 SAME_SPRING = 0.05  # share by which the stiffness of recordings of one valve may differ
-SEEN = 1.5  # factor on the largest ratio seen, where no limit can be extrapolated
+SEEN = 1.5  # factor on the largest ratio seen: a limit is no lower
 
 
 @dataclass(frozen=True)
@@ -184,8 +184,10 @@ def _limited(
 ) -> tuple[Settings, Limit | None, list[str]]:
     """Raise the levels to the limit that keeps the budget of false alarms."""
     limit = set_limit(result, settings, days) if result.estimator.monitoring else None
-    ratio, reasons = limit.ratio if limit else 1.0, []
-    if limit is None:
+    ratio, reasons = 1.0, []
+    if limit is not None:
+        ratio = max(limit.ratio, SEEN * limit.seen)
+    else:
         why = 'too little was monitored'
         if not result.estimator.monitoring:
             why = f'the recording does not finish learning ({result.estimator.status})'
@@ -297,8 +299,13 @@ def report(proposal: Proposal) -> Iterator[str]:
     )
     if proposal.limit:
         yield proposal.limit.statement()
-        if proposal.limit.ratio <= 1.0:
+        if s.level_maintenance <= 1.0:
             yield 'The limit stays at 1: the threshold keeps the budget by itself.'
+        elif proposal.limit.ratio < SEEN * proposal.limit.seen:
+            yield (
+                f'The limit is {s.level_maintenance:.2f}, {SEEN:g} times the largest value: a few '
+                'strokes stand out, of which such a distribution knows nothing.'
+            )
     for time, found in (('a minute', proposal.minute), ('an hour', proposal.hour)):
         yield (
             f'found within {time} of operation like this: friction +-{100 * found.friction:.0f} '

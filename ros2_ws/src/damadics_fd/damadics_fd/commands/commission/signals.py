@@ -11,6 +11,7 @@ from damadics_fd.commands.commission.errors import CommissioningError
 from damadics_fd.core.approximator.transmitter import delay_column
 from damadics_fd.core.record import Floats, Ints
 from damadics_fd.core.settings.identified import FaultFree
+from damadics_fd.core.signature.blocks import STEADY
 
 NEEDED = ('cv', 'x1', 'p1', 'p2', 'ps')
 APART = 60.0  # s between two recordings on the common axis
@@ -58,10 +59,11 @@ class Blocks:
         :return: mask.
         """
         before, after = _steps(self)
-        least = 0.5 * SLOWEST * self.width
+        steps = np.abs([before, after])
+        least = np.maximum(0.5 * SLOWEST * self.width, STEADY * steps.max(axis=0))
         inside = (self.x > STOPS) & (self.x < 1.0 - STOPS)
         fast = (np.abs(self.v) >= SLOWEST) & (np.abs(self.v) < FASTEST)
-        one_way = (before * after > 0.0) & (np.minimum(np.abs(before), np.abs(after)) >= least)
+        one_way = (before * after > 0.0) & (steps.min(axis=0) >= least)
         return inside & fast & one_way & np.isfinite(self.v)
 
     @property

@@ -33,6 +33,7 @@ from damadics_fd.core.valve.plug import recovery
 
 SLOPE = 0.015  # [1] the slope of the plug force is taken over +- this part of the stroke
 MPA = 1e6
+STEADY = 1.0 / 3.0  # of the larger of the steps into and out of a block: less, and it stood
 
 
 @jit
@@ -237,8 +238,10 @@ def judge_block(s: State, c: SignatureSettings) -> None:
     s.block.standing = 0
     if s.run <= 3:
         s.slide = 0  # the first block after a gap
-    # equal signs drop reversals, the minimum drops break-away blocks
-    if in_range and fast and d1 * d2 > 0.0 and min(abs(d1), abs(d2)) >= step:
+    # equal signs drop reversals; the minima drop blocks in which the stem breaks away or stops
+    steps = abs(d1), abs(d2)
+    steady = d1 * d2 > 0.0 and min(steps) >= max(step, STEADY * max(steps))
+    if in_range and fast and steady:
         s.block.moving = 1
         s.slide += 1
         slow = math.exp(-((v / c.v_stribeck) ** 2))
