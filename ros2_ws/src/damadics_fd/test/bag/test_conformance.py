@@ -209,6 +209,16 @@ def test_every_combination_of_features_is_whole_and_recovered(what, tmp_path):
             raise AssertionError(f'{what} {sorted(features)}: {error}') from error
 
 
+@pytest.mark.plain
+@pytest.mark.parametrize('what', ['schemaless', 'all'])
+@pytest.mark.parametrize('features', [set(), {'chunk', 'crc'}, {*FEATURES}])
+def test_the_barest_and_the_fullest_form_are_whole_and_recovered(what, features, tmp_path):
+    path = tmp_path / 'a.mcap'
+    path.write_bytes(Maker(features, what).build())
+    assert_whole_and_recovered(path, tmp_path / 'saved.mcap')
+
+
+@pytest.mark.plain
 def test_longer_chunks_and_longer_records_within_them_are_read(tmp_path):
     features = {'chunk', 'chunk_index', 'message_index', 'statistics', 'pad', 'everywhere', 'crc'}
     (tmp_path / 'a.mcap').write_bytes(Maker(features, 'all').build())

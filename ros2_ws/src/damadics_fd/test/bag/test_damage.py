@@ -95,20 +95,23 @@ def test_a_whole_bag_is_whole(tmp_path):
     assert verify([str(tmp_path / 'a.mcap')]) == WHOLE
 
 
-def test_a_bag_cut_at_any_byte_gives_all_messages_of_complete_chunks(tmp_path):
+@pytest.mark.parametrize('step', [pytest.param(150, marks=pytest.mark.plain), 7])
+def test_a_bag_cut_anywhere_gives_all_messages_of_complete_chunks(step, tmp_path):
     whole, cut, saved = (tmp_path / name for name in ('a.mcap', 'cut.mcap', 'saved.mcap'))
     small_bag(whole)
     data, ends = whole.read_bytes(), chunk_ends(whole)
     first = data.index(b'ros2msg')
-    near = {end + step for end in ends for step in range(-20, 21)}
-    for size in sorted({*range(0, len(data), 7), *near, *range(len(data) - 40, len(data))}):
+    finely = max(step // 10, 1)
+    near = {end + n for end in ends for n in range(-20, 21, finely)}
+    last = range(len(data) - 40, len(data), finely)
+    for size in sorted({*range(0, len(data), step), *near, *last}):
         cut.write_bytes(data[:size])
         expected = list(range(ROWS * sum(end <= size for end in ends)))
         assert seconds(cut) == expected, size
         report = inspect(cut)
         assert report.code == (LOSSY if expected else UNUSABLE), (size, report)
         assert report.messages == len(expected)
-        if size % 35 == 0 and size > first:
+        if size % (5 * step) == 0 and size > first:
             saved.unlink(missing_ok=True)
             assert salvage(cut, saved).code == report.code
             assert seconds(saved) == expected if expected else not saved.exists()
@@ -174,8 +177,9 @@ def corruptions(tmp_path: Path, count: int, seed: int) -> None:
     assert slowest < 2.0
 
 
-def test_random_corruptions(tmp_path):
-    corruptions(tmp_path, 600, seed=1)
+@pytest.mark.parametrize('count', [pytest.param(21, marks=pytest.mark.plain), 600])
+def test_random_corruptions(count, tmp_path):
+    corruptions(tmp_path, count, seed=1)
 
 
 @pytest.mark.slow
@@ -214,6 +218,21 @@ HOSTILE = {
         for i in range(20_000)
     ),
 }
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize(
+    'name', ['wrong size', 'unknown compression', 'huge record', 'huge string', 'unknown record']
+)
+def test_what_stands_between_two_chunks_costs_neither(tmp_path, name):
+    small_bag(tmp_path / 'a.mcap')
+    data = (tmp_path / 'a.mcap').read_bytes()
+    with McapFile(tmp_path / 'a.mcap') as mcap:
+        second = [batch.offset for batch in mcap.batches()][1]
+    (tmp_path / 'bad.mcap').write_bytes(data[:second] + HOSTILE[name]() + data[second:])
+    result = salvage(tmp_path / 'bad.mcap', tmp_path / 'saved.mcap')
+    assert (result.code, result.found.messages) == (LOSSY, CHUNKS * ROWS)
+    assert seconds(tmp_path / 'saved.mcap') == list(range(CHUNKS * ROWS))
 
 
 @pytest.mark.parametrize('name', HOSTILE)

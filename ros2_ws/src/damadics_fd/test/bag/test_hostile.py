@@ -168,6 +168,7 @@ def test_hostile_names_of_types(name, tmp_path):
     assert commands(tmp_path / 'a.mcap', tmp_path) == [WHOLE, WHOLE]
 
 
+@pytest.mark.plain
 def test_files_for_a_topic_with_a_nul_stay_in_their_folder(tmp_path):
     stems = unique_stems([Recording(tmp_path / 'a.mcap', '/a\0b/../measurement')] * 2)
     assert all('/' not in stem and '\0' not in stem for stem in stems)

@@ -201,6 +201,7 @@ def test_a_disk_that_stays_full_costs_what_is_told(tmp_path, monkeypatch):
     assert 'No space left' in spool.error
 
 
+@plain
 @pytest.mark.parametrize('split', [0.0, 0.5])
 def test_a_split_on_a_full_disk_loses_nothing(tmp_path, monkeypatch, split):
     disk = Disk(monkeypatch)
@@ -238,6 +239,7 @@ def test_a_folder_that_is_removed_is_made_again_with_all_that_was_in_the_file(tm
 GOLDEN = Path(__file__).parents[5] / 'bags'
 
 
+@plain
 @pytest.mark.parametrize('byte', [40, 51])
 def test_messages_whose_schema_is_lost_are_saved_all_the_same(byte, tmp_path):
     """The first schema and the end of the file are damaged; every message is still there."""

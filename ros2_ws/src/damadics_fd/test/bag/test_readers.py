@@ -70,6 +70,7 @@ def test_bags_of_rosbags_and_mcap_ros2_support_are_replayed(tmp_path):
     assert inspect(tmp_path / 'mcap_ros2.mcap').code == WHOLE
 
 
+@pytest.mark.plain
 @pytest.mark.parametrize('compression', ['NONE', 'LZ4', 'ZSTD'])
 @pytest.mark.parametrize('chunked', [True, False])
 def test_files_of_the_python_mcap_writer_are_read_in_any_form(tmp_path, compression, chunked):
