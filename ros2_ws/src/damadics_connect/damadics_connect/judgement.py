@@ -78,7 +78,8 @@ class Judgement:
     def silent(self) -> 'Judgement':
         """Return what is left once nobody repeats it: an alarm stays, health does not."""
         level = self.ne107 if self.ne107 != 'normal' else 'function_check'
-        return replace(self, state='not_monitored', ne107=level)
+        state = 'unknown' if self.state == 'unknown' else 'not_monitored'
+        return replace(self, state=state, ne107=level)
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 from damadics_connect.ages import Ages
+from damadics_connect.judgement import Judgement
 
 SECOND = 10**9
 TODAY = 1_790_000_000 * SECOND
@@ -37,3 +38,20 @@ def test_a_lasting_delay_shows_and_other_valves_are_not_concerned():
     assert ages.old('late', TODAY + 9 * SECOND, 9.0)
     assert not ages.old('good', TODAY + 9 * SECOND, 9.0)
     assert not ages.old('unheard', TODAY, 9.0)
+
+
+@pytest.mark.parametrize(
+    ('state', 'fault', 'then'),
+    [
+        ('healthy', False, 'not_monitored'),
+        ('learning', False, 'not_monitored'),
+        ('alarm', True, 'not_monitored'),
+        ('latched', True, 'not_monitored'),
+        ('unknown', False, 'unknown'),
+    ],
+)
+def test_a_silent_valve_keeps_its_alarm_and_one_that_was_lost(state, fault, then):
+    before = Judgement('lv1', state=state, fault=fault, ne107='normal', occurrence=3)
+    after = before.silent()
+    assert (after.state, after.fault, after.occurrence) == (then, fault, 3)
+    assert after.ne107 == 'function_check'
