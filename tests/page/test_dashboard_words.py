@@ -109,6 +109,8 @@ def test_a_point_of_a_trend_that_stands_alone_is_drawn():
         else:
             parts[-1].append(time)
     assert [len(part) > 1 for part in parts] == [True, True], 'a line needs two points'
+    assert points_of(found, ones, 9000.0)[-2:] == [[85_950.0, 1.0], [94_950.0, 1.0]]
+    assert points_of(Series(start[:0], 900.0, *[ones[:0]] * 4, []), ones[:0]) == []
 
 
 def test_the_legend_names_each_curve_once_and_no_edge_of_a_band():

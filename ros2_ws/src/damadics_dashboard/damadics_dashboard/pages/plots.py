@@ -116,7 +116,7 @@ def time_plot(
             'min': 0,
             'max': 60,
             'nameLocation': 'end',
-            'nameTextStyle': {'align': 'right', 'verticalAlign': 'top', 'padding': [18, 0, 0, 0]},
+            'nameTextStyle': {'align': 'right', 'verticalAlign': 'top', 'padding': [24, 0, 0, 0]},
             'nameGap': 0,
             'axisLine': {'onZero': False},
             'splitLine': {'show': False},

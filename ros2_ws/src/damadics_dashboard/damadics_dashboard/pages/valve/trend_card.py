@@ -19,6 +19,7 @@ from damadics_dashboard.words.texts import Texts
 RANGES = (1, 30, 365, 3650)  # days
 DAY = 86400.0
 REFRESH = 60.0  # s
+DASHES = 300  # in the width of a plot: three pixels each
 COLORS = ['--before', '--now', '--before', '--rho', '--rho']
 
 
@@ -92,7 +93,7 @@ class TrendCard:
         limits = self._t.causes.limits.get(quantity, ())
         factor = factor_of(quantity)
         series: list[Points] = [
-            points_of(found, values * factor)
+            points_of(found, values * factor, (now - since) / DASHES)
             for values in (found.least, found.mean, found.greatest)
         ]
         if len(found.start):
@@ -107,22 +108,24 @@ class TrendCard:
         self._words.set_text(words)  # without a trend the plot itself says so
 
 
-def points_of(found: Series, values: np.ndarray) -> Points:
+def points_of(found: Series, values: np.ndarray, dash: float = 0.0) -> Points:
     """
     Return a trend as a curve that is broken where nothing is known.
 
     :param found: the trend.
     :param values: of each of its intervals.
+    :param dash: least length that is seen [s]: an interval that stands alone is drawn so long.
     :return: points (time [s], value).
     """
     points: Points = []
-    before = -np.inf
-    for start, value in zip(found.start.tolist(), values.tolist(), strict=True):
-        shown = float(f'{value:.5g}')
-        if start - before > 4.0 * found.length:
-            if points:
-                points.append([before + found.length, None])
-            points.append([start, shown])  # a point that stands alone is seen as a dash
-        points.append([start + 0.5 * found.length, shown])
-        before = start
+    middle = found.start + 0.5 * found.length
+    gaps = np.flatnonzero(np.diff(found.start) > 4.0 * found.length) + 1
+    for run in np.split(np.arange(len(middle)), gaps):
+        at, shown = middle[run].tolist(), [float(f'{value:.5g}') for value in values[run]]
+        if len(run) == 1:
+            half = 0.5 * max(found.length, dash)
+            at, shown = [at[0] - half, at[0] + half], shown * 2
+        if points and at:
+            points.append([at[0], None])
+        points += [[time, value] for time, value in zip(at, shown, strict=True)]
     return points
