@@ -87,6 +87,8 @@ def test_the_history_says_what_is_wrong_in_words_and_not_the_programmers(text):
     assert shown['text'] == 'The valve moves otherwise than learned, up to 102 % of limit.'
     assert 'velocity residual' not in shown['more'] and shown['more'].startswith('Inspect')
     assert headline(row, DE)[0].endswith('bis 102 % der Grenze.')
+    (gone,) = history_rows([{**event(FaultEvent.CLEARED, 'cleared 1: ...'), 'duration': 64.0}], DE)
+    assert gone['text'] == 'Es dauerte 1 min 4 s.'
 
 
 def test_a_valve_that_is_not_monitored_shows_no_residual_of_before():

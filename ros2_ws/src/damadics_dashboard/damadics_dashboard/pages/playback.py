@@ -87,6 +87,7 @@ class Playback:
                 occurrence=event.occurrence,
                 level=event.level,
                 ratio=event.ratio if math.isfinite(event.ratio) else None,
+                duration=event.duration if math.isfinite(event.duration) else None,
                 cause=event.cause,
                 confidence=event.confidence,
                 strength=event.strength,

@@ -224,6 +224,8 @@ def _row(row: EventRow, t: Texts) -> dict[str, Cell]:
     what, numbers, advice = '', '', ''
     if transition in (FaultEvent.RAISED, FaultEvent.CHANGED):
         what, numbers, advice = headline(row, t)
+    elif transition == FaultEvent.CLEARED and row['duration'] is not None:
+        what = t('lasted', time=t.duration(row['duration']))
     return {
         'moment': t.moment(row['stamp']),
         'valve': row['valve'] or 'valve',
