@@ -121,8 +121,8 @@ class _Page:
     def _head(self, window: float) -> None:
         t, valve = self._t, self._valve
         with box('div', 'row w-full'):
-            tag = valve.tag if valve.tag != valve.title else ''
-            markup('title.html', back=f'{t("fleet")} /', text=valve.title, tag=tag)
+            self._title = markup('title.html', text='')
+            self._draw_title()
             box('span', 'spacer')
             shown = {seconds: t.duration(seconds).removesuffix(' 0 s') for seconds in WINDOWS}
             choice = ui.toggle(shown, value=window, on_change=lambda e: self._show(e.value))
@@ -140,6 +140,16 @@ class _Page:
             if may_operate():
                 with valve_buttons(self._watcher, valve, t):
                     self._strokes = StrokeItem(self._watcher, valve, t)
+
+    def _draw_title(self) -> None:
+        valve = self._valve
+        redraw(
+            self._title,
+            'title.html',
+            back=f'{self._t("fleet")} /',
+            text=valve.title,
+            tag=valve.tag if valve.tag != valve.title else '',
+        )
 
     def _show(self, window: float) -> None:
         self._feed.window = float(window)
@@ -192,6 +202,7 @@ class _Page:
                     simulator_panel(self._watcher, self._valve, self._t)
         self._second += 1
         if self._second % 4 == 1:
+            self._draw_title()
             self._draw_history()
             self._signals.show_values()
             self._trends.update()
