@@ -68,6 +68,8 @@ def test_live_and_offline_agree_bit_for_bit(tmp_path, mode, source, speeds, chan
         for field in ('xi1', 'xi2', 'phi', 'x2_hat'):
             assert estimate[field].tobytes() == result.estimates[field][rows].tobytes()
         rises = raised(read_columns(bag, '/fault_event'))
+        if mode == 'scada':
+            tell_the_cause(read_columns(bag, '/fault_event', ['transition', 'cause', 'text']))
         assert set(edges(read_columns(bag, '/fault_flag'))) <= set(rises)
         assert rises == [event.stamp for event in result.detections]
         out = tmp_path / 'again.json'
@@ -110,6 +112,15 @@ def test_live_replay_leaves_the_clock_of_its_node_alone():
         context.try_shutdown()
 
 
+def tell_the_cause(events: dict[str, np.ndarray]) -> None:
+    """See that a person who reads the events alone learns test, cause and how much is off."""
+    named = [cause for cause in events['cause'].tolist() if cause]
+    assert named, 'no event names the cause'
+    assert 'f16' in named[-1]
+    (*_, text) = [text for text in events['text'].tolist() if 'f16 supply pressure drop' in text]
+    assert '% of the stroke too far' in text
+
+
 def raised(events: dict[str, np.ndarray]) -> list[int]:
     """Return the stamps at which a fault was flagged."""
     return events['stamp'][events['transition'] == RAISED].tolist()
@@ -144,7 +155,7 @@ def played(source: Path, folder: Path, mode: str, speed: int, changes: dict) -> 
         wait_for_end(processes, 'replay')
         processes.check()
         for node in ('estimator', 'detector', 'recorder'):
-            processes.end(node)
+            processes.end(node, 60.0)  # it may be learning
     return folder / 'bag'
 
 

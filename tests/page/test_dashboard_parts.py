@@ -17,7 +17,7 @@ from damadics_dashboard.pages.playback import settings_in_file
 from damadics_dashboard.store.export import cell
 from damadics_dashboard.words.templates import TEMPLATES, render
 from damadics_dashboard.words.texts import texts
-from damadics_dashboard.words.valve_words import alarm_words
+from damadics_dashboard.words.valve_words import alarm_words, history_rows
 from damadics_fd.core.settings import SettingsError
 from damadics_fd.store.access import Access, Grant, Role
 from damadics_msgs.msg import FaultEvent, FaultFlag, FleetLayout, Isolation, Measurement
@@ -238,6 +238,25 @@ def test_an_alarm_says_what_is_wrong_how_much_and_what_to_do_then_the_numbers():
     german = alarm_words(valve, valve.alarm(), texts('de'), name=False)
     assert german.headline == 'Die Reibung beträgt das 2,6-Fache des Normalen.'
     assert german.found == 'Von einem Leitwartentest gefunden.'
+
+
+def test_an_alarm_of_a_control_rooms_signals_names_its_causes():
+    valve = Valve('lv101')
+    alarm = FaultFlag(state=FaultFlag.STATE_ALARM, level=1, occurrence=1, threshold=1.0)
+    valve.take_flag(alarm, 100.0)
+    told = {'cause': 'f19 or f2', 'confidence': 0.71, 'ratio': 1.2, 'threshold': 1.0}
+    text = 'flow path: f19 flow sensor or f2 plug or seat sedimentation; flow 25 % too low'
+    valve.take_event({**event(FaultEvent.CHANGED), **told, 'text': text})
+    words = alarm_words(valve, valve.alarm(), texts('en'), name=False)
+    assert words.headline == 'Looks like f19 flow sensor or f2 plug or seat sedimentation.'
+    assert words.text == text
+    assert words.found == 'Found by a control-room test.'
+    cells = dict(words.cells)
+    assert cells['Change'] == 'confidence 71 %'
+    assert '1/s' not in cells['Limit']  # a statistic over its limit
+    (row,) = history_rows([{**event(FaultEvent.CHANGED), **told, 'text': text}], texts('de'))
+    assert row['text'].startswith('Sieht aus nach f19 flow sensor')
+    assert text in row['more']
 
 
 def test_durations_and_times_have_one_form():

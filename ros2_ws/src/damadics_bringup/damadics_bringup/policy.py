@@ -70,7 +70,7 @@ NODES = {  # of every valve
             '/diagnostics',
             '~/transition_event',
         ),
-        ('estimate', 'fault_flag'),
+        ('estimate', 'fault_flag', 'isolation'),
         ('acknowledge', 'reset', 'shelve', 'partial_stroke', *(f'~/{name}' for name in LIFECYCLE)),
     ),
     'driver': Rights(

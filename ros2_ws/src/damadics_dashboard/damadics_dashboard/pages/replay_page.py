@@ -19,7 +19,7 @@ from damadics_dashboard.pages.frame import card, frame
 from damadics_dashboard.pages.plots import News, Options, Plot, signature_plot, time_plot
 from damadics_dashboard.server.limits import LARGEST_UPLOAD
 from damadics_dashboard.words.texts import Texts
-from damadics_dashboard.words.valve_words import cause_of, history_rows
+from damadics_dashboard.words.valve_words import cause_of, faults_of, history_rows
 
 if TYPE_CHECKING:
     from damadics_dashboard.pages.playback import Given, Playback, Truth
@@ -173,14 +173,16 @@ def _show(done: 'Playback', mode: str, t: Texts) -> None:
     elif not done.monitored:
         kind = 'off'
     names = (e.cause for e in reversed(done.events) if e.cause not in ('', 'undetermined'))
-    cause = cause_of(next(names, ''), t)
+    name = next(names, '')
+    cause = cause_of(name, t)
+    suspect = faults_of(name) if cause is None else cause.words()[0]
     facts = (
         done.name,
         f'{t("mode")} {mode}',
         t('sample_count', number=done.samples),
         t.duration(done.duration),
         truth_words(done.truth, t),
-        t('suspected', cause=cause.words()[0]) if cause is not None and alarms else '',
+        t('suspected', cause=suspect) if suspect and alarms else '',
     )
     left_out = [t('left_out', what=plain(p, COMMENT)) for p in done.problems[:5]]
     detail = ' · '.join(plain(fact, COMMENT) for fact in (*facts, *left_out) if fact)

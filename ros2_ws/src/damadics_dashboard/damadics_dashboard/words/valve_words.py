@@ -7,7 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from urllib.parse import quote
 
-from damadics_fd.causes import Cause
+from damadics_fd.causes import MOST_CERTAIN, Cause
+from damadics_fd.core.decision.events import STATISTIC
+from damadics_fd.core.scada.naming.names import NAMES
 from damadics_fd.core.stamps import SECOND as NANO
 from damadics_fd.core.text import COMMENT, SENTENCE, plain
 from damadics_msgs.msg import FaultEvent
@@ -117,6 +119,21 @@ def cause_of(name: str, t: Texts) -> Cause | None:
     return t.causes.causes.get(name) if name not in SHARED else None
 
 
+def faults_of(names: str) -> str:
+    """
+    Word the faults of the benchmark that a control room's signals show.
+
+    :param names: as an event of mode scada carries them.
+    :return: '' where they are no such names.
+
+    >>> faults_of('f19 or f2'), faults_of('friction_up')
+    ('f19 flow sensor or f2 plug or seat sedimentation', '')
+    """
+    known = {f'f{number}': name for number, name in NAMES.items()}
+    named = names.split(' or ')
+    return ' or '.join(f'{n} {known[n]}' for n in named) if set(named) <= set(known) else ''
+
+
 def headline(event: EventRow, t: Texts) -> tuple[str, str, str]:
     """
     Say first what is wrong and how much, and what to do.
@@ -134,6 +151,10 @@ def headline(event: EventRow, t: Texts) -> tuple[str, str, str]:
             event.get('deviation', math.nan),
             math.nan if confidence is None else confidence,
         )
+    if named := faults_of(event.get('cause') or ''):
+        sure = event.get('confidence')
+        numbers = '' if sure is None else t('sure', share=t.percent(min(sure, MOST_CERTAIN)))
+        return t('looks_like', cause=named), numbers, t('deviates_advice')
     ratio = event.get('ratio')
     if ratio is not None and math.isfinite(ratio) and ratio >= 1.0:
         return t('deviates', size=of_limit(ratio, t)), '', t('deviates_advice')
@@ -156,13 +177,14 @@ def alarm_words(valve: Valve, alarm: Alarm, t: Texts, *, name: bool) -> AlarmWor
         what, numbers, advice = t('state_lost'), '', t('state_lost_advice')
     else:
         what, numbers, advice = headline(e, t)
-    ratio = e.get('ratio')
+    ratio, limit = e.get('ratio'), e.get('threshold')
+    unit = '' if limit == STATISTIC else '1/s'
     cells = [
         (t('alarm_number'), str(alarm.occurrence)),
         (t('numbers'), numbers or '–'),
         (t('largest_residual'), of_limit(ratio, t)),
-        (t('residual_now'), t.number(e.get('residual'), '1/s')),
-        (t('limit'), t.number(e.get('threshold'), '1/s')),
+        (t('residual_now'), t.number(e.get('residual'), unit)),
+        (t('limit'), t.number(limit, unit)),
         (t('duration'), t.duration(e.get('duration'))),
         (t('since'), t.moment(alarm.onset)),
     ]
@@ -188,7 +210,7 @@ def found_by(event: EventRow, t: Texts) -> str:
     :param t: the words.
     :return: a sentence, '' where nothing is known.
     """
-    if event.get('found_by') == 'control-room test':
+    if event.get('found_by') == 'control-room test' or faults_of(event.get('cause') or ''):
         return t('found_test')
     ratio = event.get('ratio')
     if ratio is None or not math.isfinite(ratio):

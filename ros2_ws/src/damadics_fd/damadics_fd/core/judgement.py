@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from damadics_fd.core.decision.alarm import CHANGED, RAISED
+from damadics_fd.core.decision.detector import Detector
 from damadics_fd.core.decision.events import Event
 
 
@@ -60,13 +61,83 @@ def with_judgements(
         if event.transition == RAISED:
             first = next((look for look in waiting if look.stamp >= event.stamp), None)
             if first is not None:
-                onset = min(first.onset, event.stamp)
-                text = event.text.replace('control-room test', f'control-room test {first.test}')
-                duration = (event.stamp - onset) * 1e-9
-                event = replace(event, test=first.test, onset=onset, duration=duration, text=text)
+                event = _dated(event, first)
             latest = event
         told.append(event)
     return told
+
+
+class LiveJudgement:
+    """
+    What the estimator of one valve takes a fault for, in the events of its detector, as they come.
+
+    :param detector: of the valve.
+    """
+
+    def __init__(self, detector: Detector) -> None:
+        self._detector = detector
+        self._known: Judgement | None = None
+
+    def tell(self, events: Iterable[Event], judgement: Judgement | None = None) -> list[Event]:
+        """
+        Take what has happened.
+
+        Judgements and estimates may come in any order, and a judgement more than once.
+
+        :param events: of the detector.
+        :param judgement: the latest of the estimator; None where it sent none.
+        :return: the events, an alarm with its test, onset and, once known, cause; then one event
+            where the judgement brings something new.
+        """
+        new = judgement is not None and not _same(judgement, self._known)
+        self._known = judgement if new else self._known
+        told, known = [], self._of_present()
+        for event in events:
+            if known is not None and event.transition in (RAISED, CHANGED):
+                event, new = _with_cause(_dated(event, known), known), False
+            told.append(event)
+        if known is None:
+            return told
+        self._detector.antedate(known.onset)
+        if new and known.text:
+            (alarm,) = replace(self._detector.decision, transitions=1 << CHANGED).events
+            told.append(_named(alarm, known))
+        return told
+
+    def _of_present(self) -> Judgement | None:
+        """Return what is known of the alarm that stands or is latched."""
+        onset = self._detector.decision.onset
+        known = self._known
+        return known if onset and known is not None and known.stamp >= onset else None
+
+
+def _same(one: Judgement, other: Judgement | None) -> bool:
+    return other is not None and (one.stamp, one.text) == (other.stamp, other.text)
+
+
+def _dated(event: Event, look: Judgement) -> Event:
+    """Put the test that raised it and its onset into an event."""
+    onset = min(look.onset, event.stamp)
+    return replace(
+        event,
+        test=look.test,
+        onset=onset,
+        duration=(event.stamp - onset) * 1e-9,
+        text=event.text.replace('control-room test', f'control-room test {look.test}'),
+    )
+
+
+def _with_cause(event: Event, look: Judgement) -> Event:
+    if not look.text:
+        return event
+    return replace(
+        event,
+        cause=' or '.join(look.candidates),
+        candidates=look.candidates,
+        confidence=look.confidence[0] if look.confidence else math.nan,
+        strength=look.strength,
+        text=f'{event.text}; {look.text}',
+    )
 
 
 def _named(alarm: Event, look: Judgement) -> Event:

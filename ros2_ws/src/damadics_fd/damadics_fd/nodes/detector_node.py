@@ -13,6 +13,7 @@ from damadics_fd.causes import explain
 from damadics_fd.core.approximator.state import Estimate
 from damadics_fd.core.decision.detector import Detector, Outcome
 from damadics_fd.core.decision.events import Decision, Event
+from damadics_fd.core.judgement import Judgement, LiveJudgement
 from damadics_fd.core.modes import PHASE_INIT, PHASE_MONITOR
 from damadics_fd.core.text import SENTENCE, plain
 from damadics_fd.nodes.alarm_memory import AlarmMemory
@@ -25,7 +26,12 @@ from damadics_fd.nodes.second_publisher import RivalWatch
 from damadics_fd.nodes.signature_publisher import SignaturePublisher, read_causes
 from damadics_fd.ros import qos
 from damadics_fd.ros.arguments import check_node_arguments
-from damadics_fd.ros.conversions import event_message, isolation_message, write_flag
+from damadics_fd.ros.conversions import (
+    event_message,
+    isolation_message,
+    read_judgement,
+    write_flag,
+)
 from damadics_fd.ros.diagnostics import Level, Report
 from damadics_fd.ros.raw import Encoder, any_estimate, stamp_of
 from damadics_fd.ros.spin import spin
@@ -99,6 +105,7 @@ class DetectorNode(MonitoringNode):
         self._judged = self._twice = 0
         self._phase = PHASE_INIT
         self._was_silent = True
+        self._live = LiveJudgement(self._core)
         self._tag = ''
         self._encode = Encoder()
         self._flag = FaultFlag()
@@ -141,10 +148,24 @@ class DetectorNode(MonitoringNode):
             heard(*found)
 
         contained = self.entities.contained('estimate', take)
-        self._taker = Taker(lambda estimate, tag: contained((estimate, tag)))
+        hear = self.entities.contained('isolation', self._hear)
+        self._taker = Taker(lambda estimate, tag: contained((estimate, tag)), hear)
         takers = self._joints.at(self.resolve_topic_name('estimate')).takers
         takers.append(self._taker)
         self.entities.on_release(lambda: takers.remove(self._taker))
+        if self.settings.mode == 'scada':  # there the estimator knows the cause
+            self.entities.subscription(
+                Isolation,
+                'isolation',
+                lambda message: self._hear(read_judgement(message)),
+                qos.FLAG,
+            )
+
+    def _hear(self, judgement: Judgement) -> None:
+        """Tell in an event what the estimator takes the fault for."""
+        if self.active:
+            self._tell(self._live.tell((), judgement), self._flag.header.frame_id)
+            self._decision = self._core.decision if self._decision else None
 
     def _read(self, data: bytes) -> tuple[Estimate, str] | None:
         if self._taker.is_echo(stamp_of(data)):
@@ -201,7 +222,8 @@ class DetectorNode(MonitoringNode):
     def _keep(self, decision: Decision, tag: str) -> None:
         """Tell transitions, and keep alarm and signature for a restart."""
         if decision.events:
-            self._tell(decision.events, tag)
+            self._tell(self._live.tell(decision.events), tag)
+            self._decision = self._core.decision
         self._signature.update(decision.stamp, tag)
 
     def _tell(self, events: Iterable[Event], frame_id: str, more: str = '') -> None:
@@ -212,7 +234,7 @@ class DetectorNode(MonitoringNode):
             self._fault_event.publish(message)
             own = bool(self._core.signature.state[0].own)
             isolation = isolation_message(explained, frame_id, own)
-            if isolation and self.settings.mode != 'scada':  # there the estimator knows more
+            if isolation and self.settings.mode != 'scada':  # there the estimator tells it
                 self._isolation.publish(isolation)
         self._memory.keep()
 

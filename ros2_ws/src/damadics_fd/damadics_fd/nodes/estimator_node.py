@@ -105,8 +105,8 @@ class EstimatorNode(MonitoringNode):
             self.diagnostics.check()
             return
         self._progress = estimate.progress
+        self._tell_judgement(tag)  # first, for the alarm that the estimate may raise
         self._give(estimate, tag)
-        self._tell_judgement(tag)
         phase = self._core.phase
         if phase != self._last:
             learned = phase == 'monitor' and self._last.startswith('learn')
@@ -130,6 +130,7 @@ class EstimatorNode(MonitoringNode):
         if judgement is not None and judgement is not self._judgement:
             self._judgement = judgement
             self._isolation.publish(judgement_message(judgement, tag))
+            self._joint.tell(judgement)
 
     def _relearn(self, request: Relearn.Request, response: Relearn.Response) -> Relearn.Response:
         if self.settings.mode == 'paper':

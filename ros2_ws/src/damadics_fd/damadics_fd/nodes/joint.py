@@ -10,6 +10,7 @@ from collections import deque
 from collections.abc import Callable
 
 from damadics_fd.core.approximator.state import Estimate
+from damadics_fd.core.judgement import Judgement
 
 MOST_ECHOES = 100_000  # as many as the queue of samples holds
 
@@ -19,10 +20,15 @@ class Taker:
     A detector that is handed estimates.
 
     :param take: called with each estimate and its tag.
+    :param hear: called with each judgement, where the mode has any.
     """
 
-    def __init__(self, take: Callable[[Estimate, str], None]) -> None:
-        self.take = take
+    def __init__(
+        self,
+        take: Callable[[Estimate, str], None],
+        hear: Callable[[Judgement], None] = lambda judgement: None,
+    ) -> None:
+        self.take, self.hear = take, hear
         self._echoes: deque[int] = deque(maxlen=MOST_ECHOES)
 
     def sent(self, stamp: int) -> None:
@@ -62,6 +68,15 @@ class Joint:
         """
         for taker in self.takers:
             taker.take(estimate, tag)
+
+    def tell(self, judgement: Judgement) -> None:
+        """
+        Give a judgement to the detectors.
+
+        :param judgement: of the estimator; over DDS it comes to them once more.
+        """
+        for taker in self.takers:
+            taker.hear(judgement)
 
 
 class Joints:

@@ -15,6 +15,7 @@ from damadics_fd.core.decision.events import Decision, Event
 from damadics_fd.core.judgement import Judgement
 from damadics_fd.core.sample import Sample
 from damadics_fd.core.stamps import SECOND
+from damadics_fd.core.text import NAME, SENTENCE, plain
 
 SCALARS = tuple(
     name for name in Estimate.names() if name not in ('stamp', 'alpha1', 'alpha4', 'alpha5')
@@ -170,3 +171,23 @@ def judgement_message(judgement: Judgement, frame_id: str) -> Isolation:
     set_stamp(message.header.stamp, judgement.stamp)
     set_stamp(message.onset, judgement.onset)
     return message
+
+
+def read_judgement(message: Isolation) -> Judgement:
+    """
+    Return what an estimator takes a fault for out of its message.
+
+    :param message: the message.
+    :return: what the estimator node had.
+    """
+    return Judgement(
+        nanoseconds(message.header.stamp),
+        message.occurrence,
+        plain(message.test, NAME),
+        nanoseconds(message.onset),
+        plain(message.found_by, NAME),
+        tuple(plain(name, NAME) for name in message.candidate),
+        tuple(message.confidence),
+        message.strength,
+        plain(message.text, SENTENCE),
+    )

@@ -10,7 +10,14 @@ import numpy as np
 import rclpy
 from builtin_interfaces.msg import Time
 from damadics_msgs.msg import Estimate as EstimateMessage
-from damadics_msgs.msg import FaultEvent, FaultFlag, FaultState, Float64Stamped, Measurement
+from damadics_msgs.msg import (
+    FaultEvent,
+    FaultFlag,
+    FaultState,
+    Float64Stamped,
+    Isolation,
+    Measurement,
+)
 from rclpy.context import Context
 from rclpy.duration import Duration
 from rclpy.executors import ExternalShutdownException
@@ -23,12 +30,19 @@ from damadics_fd.bag.recording import Recording
 from damadics_fd.causes import explain, load_causes
 from damadics_fd.commands.replay.bags import Plan, joined
 from damadics_fd.commands.replay.flags import frame_id
+from damadics_fd.core.judgement import Judgement, LiveJudgement
 from damadics_fd.core.monitor import Chain
 from damadics_fd.core.quality import Refused
 from damadics_fd.core.sample import SIGNALS, Sample
 from damadics_fd.nodes.signature_publisher import SignaturePublisher
 from damadics_fd.ros import qos
-from damadics_fd.ros.conversions import event_message, header_of, set_stamp, write_flag
+from damadics_fd.ros.conversions import (
+    event_message,
+    header_of,
+    judgement_message,
+    set_stamp,
+    write_flag,
+)
 from damadics_fd.ros.entities import Entities
 from damadics_fd.ros.raw import Encoder, EstimateEncoder
 
@@ -66,6 +80,10 @@ class Judgements:
             self._causes.limits,
         )
         self._shown: tuple[tuple[bool, int, int], int] | None = None
+        self._live = LiveJudgement(monitor.detector)
+        self._judgement: Judgement | None = None
+        if monitor.estimator.stride:
+            self._isolation = node.create_publisher(Isolation, 'isolation', qos.FLAG)
 
     def take(self, sample: Sample) -> None:
         """
@@ -87,7 +105,13 @@ class Judgements:
             flag = FaultFlag(header=header_of(stamp, tag))
             write_flag(decision, flag)
             self._flag.publish(flag)
-        for event in decision.events:
+        judgement = self._monitor.estimator.judgement
+        if judgement is self._judgement:
+            judgement = None
+        if judgement is not None:
+            self._judgement = judgement
+            self._isolation.publish(judgement_message(judgement, tag))
+        for event in self._live.tell(decision.events, judgement):
             self._event.publish(event_message(explain(event, self._causes, tag), tag))
         self._signature.update(stamp, tag)
 

@@ -174,6 +174,17 @@ class Detector:
         """
         return self._outcome(requests.unshelve(self.state[0]))
 
+    def antedate(self, onset: int) -> None:
+        """
+        Take over an earlier onset of the present alarm from who knows better.
+
+        :param onset: estimated [ns]; a later one than the present changes nothing.
+        """
+        s = self.state[0]
+        if (s.active or s.latched) and 0 < onset < s.onset:
+            s.onset = onset
+            self._show(0)
+
     def save(self) -> Saved:
         """
         Return the state, alarms included, to be kept over a restart.

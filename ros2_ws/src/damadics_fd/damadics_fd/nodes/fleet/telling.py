@@ -12,8 +12,8 @@ from rclpy.node import Node
 
 from damadics_fd.causes import CauseTable, explain
 from damadics_fd.core.approximator.state import Estimate
-from damadics_fd.core.decision.events import Decision
-from damadics_fd.core.judgement import Judgement
+from damadics_fd.core.decision.events import Decision, Event
+from damadics_fd.core.judgement import Judgement, LiveJudgement
 from damadics_fd.core.record import Floats
 from damadics_fd.core.text import SENTENCE, plain
 from damadics_fd.nodes.fleet.ages import Ages
@@ -63,6 +63,7 @@ class Telling:
         self._exposed: dict[int, Exposed] = {}
         self._watched: list[int] = []
         self._judgements: dict[int, Judgement] = {}  # the latest of mode scada, by valve
+        self._live: dict[int, LiveJudgement] = {}  # of valves in mode scada that had an alarm
 
     def expose(self, count: int, take: Callable[[int, bytes], None]) -> None:
         """
@@ -107,21 +108,28 @@ class Telling:
         :param remark: who caused them and why.
         """
         for number, event in happened:
-            member = self._members.all[number]
-            tag, place = member.actuator, member.namespace
-            explained = explain(event, self._causes, tag)
-            message = event_message(explained, tag)
-            message.text = plain(message.text + remark, SENTENCE)
-            self._event.publish(FleetEvent(valve=place, event=message))
-            signature = self._keeping.detector(number).signature.state[0]
-            isolation = isolation_message(explained, tag, bool(signature.own))
-            if isolation and member.settings.mode != 'scada':
-                self._tell_cause(number, isolation)
-            if number in self._exposed:
-                self._exposed[number].event.publish(message)
+            if self._members.all[number].settings.mode != 'scada':
+                self._tell_event(number, event, remark)
+                continue
+            for one in self._live_of(number).tell((event,), self._news_of(number)):
+                self._tell_event(number, one, remark)
         for number in {number for number, _ in happened}:
             self._keeping.keep(number)
             self.flag(number)
+
+    def _tell_event(self, number: int, event: Event, remark: str = '') -> None:
+        member = self._members.all[number]
+        tag, place = member.actuator, member.namespace
+        explained = explain(event, self._causes, tag)
+        message = event_message(explained, tag)
+        message.text = plain(message.text + remark, SENTENCE)
+        self._event.publish(FleetEvent(valve=place, event=message))
+        signature = self._keeping.detector(number).signature.state[0]
+        isolation = isolation_message(explained, tag, bool(signature.own))
+        if isolation and member.settings.mode != 'scada':
+            self._tell_cause(number, isolation)
+        if number in self._exposed:
+            self._exposed[number].event.publish(message)
 
     def flag(self, number: int) -> None:
         """
@@ -150,11 +158,27 @@ class Telling:
                 continue
             for place in np.flatnonzero(bank.decisions['fault']).tolist():
                 number = int(numbers[place])
-                judgement = bank.judgement(place)
-                if judgement is not None and judgement is not self._judgements.get(number):
-                    self._judgements[number] = judgement
-                    tag = self._members.all[number].actuator
-                    self._tell_cause(number, judgement_message(judgement, tag))
+                judgement = self._news_of(number)
+                if judgement is None:
+                    continue
+                for event in self._live_of(number).tell((), judgement):
+                    self._tell_event(number, event)
+                self._keeping.keep(number)
+
+    def _live_of(self, number: int) -> LiveJudgement:
+        if number not in self._live:
+            self._live[number] = LiveJudgement(self._keeping.detector(number))
+        return self._live[number]
+
+    def _news_of(self, number: int) -> Judgement | None:
+        """Return what the fault of a valve is taken for, and tell it, where that has changed."""
+        bank, place = self._members.at(number)
+        judgement = bank.judgement(place)
+        if judgement is None or judgement is self._judgements.get(number):
+            return None
+        self._judgements[number] = judgement
+        self._tell_cause(number, judgement_message(judgement, self._members.all[number].actuator))
+        return judgement
 
     def _tell_cause(self, number: int, isolation: Isolation) -> None:
         place = self._members.all[number].namespace

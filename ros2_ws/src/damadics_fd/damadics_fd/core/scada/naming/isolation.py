@@ -9,6 +9,7 @@ bounded below by what the fault-free record shows; the smallest cost ranks first
 """
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -33,6 +34,7 @@ from damadics_fd.core.scada.naming.names import (
     Isolation,
     group_of,
 )
+from damadics_fd.core.scada.naming.signs import signs
 from damadics_fd.core.scada.naming.witness import by_witnesses
 from damadics_fd.core.scada.settings import ScadaConfig
 from damadics_fd.core.scada.state import (
@@ -178,7 +180,7 @@ class Isolator:
             return None
         ref = self._ref
         if ref.stem_kind == LAW or ref.flow_kind == LAW:
-            return by_witnesses(state, ref, window)
+            return replace(by_witnesses(state, ref, window), signs=signs(state, ref, window))
         if abrupt is None:
             test = int(state.test)
             abrupt = test < len(TESTS) and TESTS[test].k0 >= 1.5
@@ -203,7 +205,8 @@ class Isolator:
         if shown:
             best = ranking[0].cost
             shown = [Hypothesis(h.fault, h.strength, best - 10.0 * EQUAL) for h in shown]
-        return Isolation(float(state.t), len(window), (*shown, *ranking))
+        told = signs(state, ref, window)
+        return Isolation(float(state.t), len(window), (*shown, *ranking), told)
 
     def _window(self, state: MonitorState) -> np.ndarray:
         count = int(state.samples)

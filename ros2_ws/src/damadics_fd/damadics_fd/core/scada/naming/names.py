@@ -58,11 +58,13 @@ class Isolation:
     :param t: time of the last sample used, s.
     :param samples: samples used.
     :param ranking: hypotheses in ascending order of cost.
+    :param signs: what the signals show of it, with units.
     """
 
     t: float
     samples: int
     ranking: tuple[Hypothesis, ...]
+    signs: str = ''
 
     @property
     def best(self) -> Hypothesis:
@@ -93,12 +95,13 @@ class Isolation:
 
     def text(self) -> str:
         """Return one line for the person who gets the alarm."""
+        shown = f'; {self.signs}' if self.signs else ''
         if not self.visible:
-            return 'cause not yet visible'
+            return f'cause not yet visible{shown}'
         named = ' or '.join(f'f{fault} {NAMES[fault]}' for fault in self.candidates)
         groups = dict.fromkeys(group_of(fault) for fault in self.candidates)
         size = '' if math.isnan(self.best.strength) else f', strength {self.best.strength:+.2f}'
-        return f'{" / ".join(groups)}: {named}{size}'
+        return f'{" / ".join(groups)}: {named}{size}{shown}'
 
 
 def group_of(fault: int) -> str:
