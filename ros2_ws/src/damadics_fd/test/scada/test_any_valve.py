@@ -77,6 +77,24 @@ def test_a_slow_drift_is_followed_and_told():
     assert 'the stem has drifted by +0.' in found.drifts()[0]
 
 
+@pytest.mark.parametrize(
+    ('spread', 'noise'), [(0.12, 2.83e-3), (0.24, 1.414e-3)], ids=['noise', 'motion']
+)
+def test_twice_the_noise_or_the_motion_that_was_learned_is_no_fault(spread, noise):
+    kind = Kind()
+    found = monitor_of(kind)()
+    later = record(kind, load(HOURS, 2, spread=spread), 2, noise=noise)
+    assert not found.run(later)['alarm'].any()
+    if noise > 2e-3:
+        assert any('times as noisy as learned' in text for text in found.drifts())
+    faulty = record(kind, load(AT + 300, 3, spread=spread), 3, 19, 0.25, AT, noise=noise)
+    found = monitor_of(kind)()
+    alarms = found.run(faulty)
+    first = alarms['t'][alarms['alarm']]
+    assert len(first)
+    assert 0 <= first[0] - AT <= 10
+
+
 @pytest.mark.parametrize('p2', [2.6e6, 0.4e6])
 def test_the_generator_flows_as_iec_60534_says(p2):
     kind = Kind(kv=100.0, trim='linear')

@@ -9,6 +9,7 @@ import numpy as np
 from damadics_fd.core.scada.judging.cusum import R1
 from damadics_fd.core.scada.judging.limits import friction_limit, is_stationary, set_limits
 from damadics_fd.core.scada.judging.pressure import learn_pressure
+from damadics_fd.core.scada.judging.roughness import usual_roughness
 from damadics_fd.core.scada.laws.choose_flow import choose_flow, slow_sigma
 from damadics_fd.core.scada.laws.clean import despiked, is_regular, period_of, spike_sizes, split
 from damadics_fd.core.scada.laws.fit_stem import Piece, StemFit, fit_stem
@@ -33,7 +34,7 @@ STATED = 0.8  # share to which the stated actuator must cut the variance of an i
 # ... or equal it and leave no more than the sensors' noise
 NEARLY, SENSOR = 1.1, 1.5
 LEAST_SAMPLES = 200
-PUSHED = 0.05  # gain of the bias beyond which the actuator is another one
+PUSHED = 0.02  # gain of the bias beyond which the actuator is another one
 OFF = 1e9  # a limit that is never reached
 NEVER = 9.0  # a change of CV, which is 0..1, is never as large
 JUMPS = (0.05, 3.0)  # a jump of CV is more than this, and than this times the largest learned
@@ -97,7 +98,8 @@ def learn(
     choose_flow(ref, part, settings, identified, prediction, notes)
     if ref.stem_kind == LAW or ref.flow_kind == LAW:
         wandering = True
-    values = residuals_of(clean, settings, reference, window)
+    values, rough = residuals_of(clean, settings, reference, window)
+    ref.rough[:] = usual_roughness(rough)
     sigma = np.full(N_RESIDUALS, np.nan)
     if ref.stem_kind == LAW:
         sigma[R1] = max(identified.sigma, 1e-4)

@@ -9,9 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from damadics_fd.core.scada.judging.cusum import R2, TEST_NAMES, TESTS
+from damadics_fd.core.scada.judging.cusum import R1, R2, TEST_NAMES, TESTS
 from damadics_fd.core.scada.judging.predict import STRANGE
 from damadics_fd.core.scada.judging.residuals import FLOW_DRIFT, STEM_DRIFT
+from damadics_fd.core.scada.judging.roughness import rougher
 from damadics_fd.core.scada.laws.actuator import F_RANGE, P_RANGE, T_RANGE, TPH_PER_KGS
 from damadics_fd.core.scada.learning import LearningError, learn
 from damadics_fd.core.scada.loops import TRACE, bring_up, collect, run_column
@@ -24,6 +25,7 @@ Floats = NDArray[np.float64]
 KEPT = ('alarm', 't_alarm', 't_onset', 'test', 'occurrence', 'stood', 'recovery', 'stands')
 FLOW_TEST = [test.residual for test in TESTS].index(R2) + 1
 LEARN_AGAIN_S = 60.0
+ROUGH = 1.3  # noise that has grown by this factor is told
 
 
 @dataclass(frozen=True)
@@ -237,13 +239,19 @@ class ScadaMonitor:
         )
 
     def drifts(self) -> list[str]:
-        """Return what has drifted by more than half of what is followed."""
+        """Return what has drifted by more than half of what is followed, and noise that grew."""
+        if self.reference is None:
+            return []
         stem, flow = (float(v) for v in self.state.drift)
         told = []
         if abs(stem) > 0.5 * STEM_DRIFT:
             told.append(f'the stem has drifted by {100.0 * stem:+.1f} % of the stroke')
         if abs(flow) > 0.5 * FLOW_DRIFT:
             told.append(f'the flow has drifted by {100.0 * math.expm1(flow):+.0f} %')
+        for name, r in (('stem', R1), ('flow', R2)):
+            factor = float(rougher(self.state, self.reference[0], r, 1))
+            if factor > ROUGH:
+                told.append(f'the {name} is {factor:.1f} times as noisy as learned')
         return told
 
     def missing(self) -> list[str]:

@@ -13,7 +13,7 @@ from damadics_fd.core.record import Floats
 from damadics_fd.core.scada.judging.predict import predict
 from damadics_fd.core.scada.judging.residuals import residuals
 from damadics_fd.core.scada.settings import ScadaSettings
-from damadics_fd.core.scada.state import MONITOR, N_RESIDUALS, N_WEIGHTS
+from damadics_fd.core.scada.state import MONITOR, N_RESIDUALS, N_ROUGH, N_WEIGHTS
 
 
 @dataclass(frozen=True)
@@ -37,6 +37,7 @@ def _predict_record(
     samples: np.ndarray,
     phi: np.ndarray,
     models: np.ndarray,
+    rough: np.ndarray,
 ) -> None:
     s = state[0]
     for i in range(samples.shape[0]):
@@ -52,6 +53,7 @@ def _predict_record(
         models[i, 5] = 1.0 if s.masked else 0.0
         for k in range(N_RESIDUALS):
             models[i, 6 + k] = s.residual[k] if s.testable[k] > 0 else math.nan
+        rough[i] = s.rough
 
 
 def predicted(
@@ -63,7 +65,8 @@ def predicted(
     trial['x_sd'] = trial['f_sd'] = 1.0
     phi = np.empty((len(samples), N_WEIGHTS))
     models = np.empty((len(samples), 6 + N_RESIDUALS))
-    _predict_record(np.zeros(1, MONITOR), settings.record(), trial, samples, phi, models)
+    rough = np.empty((len(samples), N_ROUGH, 2))
+    _predict_record(np.zeros(1, MONITOR), settings.record(), trial, samples, phi, models, rough)
     phi, models = phi[window], models[window]
     xm, xd, f, sq, f_model, masked = models[:, :6].T
     return Prediction(phi, xm, xd, f, sq, f_model, masked > 0)
@@ -71,10 +74,15 @@ def predicted(
 
 def residuals_of(
     samples: Floats, settings: ScadaSettings, reference: np.ndarray, window: np.ndarray
-) -> Floats:
-    """Return the residuals of the record as the monitor will see them, NaN where not testable."""
+) -> tuple[Floats, Floats]:
+    """
+    Return the residuals of the record as the monitor will see them, and their roughness.
+
+    :return: residuals, NaN where not testable, shape (n, 6); roughness as it is followed.
+    """
     phi = np.empty((len(samples), N_WEIGHTS))
     models = np.empty((len(samples), 6 + N_RESIDUALS))
-    _predict_record(np.zeros(1, MONITOR), settings.record(), reference, samples, phi, models)
-    values: Floats = models[window][:, 6:]
-    return values
+    rough = np.empty((len(samples), N_ROUGH, 2))
+    state, record = np.zeros(1, MONITOR), settings.record()
+    _predict_record(state, record, reference, samples, phi, models, rough)
+    return models[window][:, 6:], rough[window]

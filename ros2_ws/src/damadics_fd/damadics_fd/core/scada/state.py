@@ -16,6 +16,7 @@ N_WEIGHTS = 11
 BASIC_WEIGHTS = 3  # constant, gain, CV slope; the others only where they earn their place
 HISTORY_LENGTH = 1536
 N_RESIDUALS = 6
+N_ROUGH = 5  # of them, whose noise is followed: all but the process
 NOMINAL, LAW = range(2)  # where stem and flow come from: the stated actuator, what was identified
 
 
@@ -79,6 +80,7 @@ class Reference(Record):
     k: Annotated[Floats, N_TESTS]
     h: Annotated[Floats, N_TESTS]
     clip: Annotated[Floats, N_TESTS]
+    rough: Annotated[Floats, N_ROUGH, 2]  # usual change from sample to sample, block to block
     s1: float
     kap2: float
     llr_limit: float
@@ -146,6 +148,11 @@ class MonitorState(Record):
     sq: float
     masked: bool
     residual: Annotated[Floats, N_RESIDUALS]
+    rough: Annotated[Floats, N_ROUGH, 2]  # lately, as learned in the reference
+    rough_last: Annotated[Floats, N_ROUGH, 2]
+    rough_count: Annotated[Ints, N_ROUGH, 2]
+    rough_sum: Annotated[Floats, N_ROUGH]  # of the block that is not full
+    rough_size: Annotated[Ints, N_ROUGH]
     g: Annotated[Floats, N_TESTS, 2]
     zero: Annotated[Floats, N_TESTS, 2]  # when g was last zero: estimate of the onset
     llr: float

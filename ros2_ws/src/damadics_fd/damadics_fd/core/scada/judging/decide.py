@@ -8,11 +8,12 @@ import numpy as np
 
 from damadics_fd.core.jit import jit
 from damadics_fd.core.scada.judging.cusum import FRICTION_TEST, R1, R2, TESTS
+from damadics_fd.core.scada.judging.roughness import rougher
 from damadics_fd.core.scada.state import LAW, N_RESIDUALS, N_TESTS, MonitorState, Reference
 
 LLR_CLIP = 8.0
 TEST_RESIDUAL = np.array([test.residual for test in TESTS])
-JUMP_TEST = np.array([test.k0 == 4.0 for test in TESTS])
+SCALES = np.array([2 if test.block >= 30 else 1 for test in TESTS])  # of the roughness
 # Multiples of its limit beyond which a statistic does not grow, so that it comes back in time
 # after the fault: by how quick the test is.
 CAPS = (3.0, 1.2, 1.05)
@@ -62,7 +63,7 @@ def reject_spikes(s: MonitorState, ref: Reference) -> None:
         for i in range(N_TESTS):
             if TEST_RESIDUAL[i] != r or not ref.sd[i] > 0.0 or math.isnan(value):
                 continue
-            z = abs(value - ref.mu[i]) / ref.sd[i]
+            z = abs(value - ref.mu[i]) / (ref.sd[i] * rougher(s, ref, r, 1))
             if jumped > 0 and (back or z < BACK):
                 for j in range(N_TESTS):
                     if TEST_RESIDUAL[j] == r:
@@ -103,7 +104,7 @@ def decide(s: MonitorState, ref: Reference) -> None:
         if s.testable[r] > 0:
             if law and s.inside == 0 and ref.k[i] < QUICK:
                 value = ref.mu[i]  # slow tests of a law believe it only where it was learned
-            z = (value - ref.mu[i]) / ref.sd[i]
+            z = (value - ref.mu[i]) / (ref.sd[i] * rougher(s, ref, r, SCALES[i]))
             z = min(max(z, -ref.clip[i]), ref.clip[i])
             k = ref.k[i]
             if r <= R2:
@@ -168,8 +169,9 @@ def note_evidence(s: MonitorState) -> None:
 def test_friction(s: MonitorState, ref: Reference) -> None:
     """Compare the model with a copy of three times the play by their likelihoods."""
     if s.testable[R1] > 0:
-        z1 = s.residual[R1] / ref.s1
-        z1d = (s.residual[R1] + s.xm[0] - s.xd) / ref.s1
+        s1 = ref.s1 * rougher(s, ref, R1, 1)
+        z1 = s.residual[R1] / s1
+        z1d = (s.residual[R1] + s.xm[0] - s.xd) / s1
         gain = (z1 * z1 - z1d * z1d) / (2.0 * ref.kap2)
         s.llr += min(max(gain, -LLR_CLIP), LLR_CLIP)
         s.llr = min(s.llr, CAPS[0] * ref.llr_limit)

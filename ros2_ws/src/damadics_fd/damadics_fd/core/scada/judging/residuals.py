@@ -7,6 +7,7 @@ import math
 from damadics_fd.core.jit import jit
 from damadics_fd.core.scada.judging.cusum import P1, P2, PROCESS, R1, R2, T1
 from damadics_fd.core.scada.judging.predict import repeated
+from damadics_fd.core.scada.judging.roughness import follow_roughness
 from damadics_fd.core.scada.laws.flow_law import flow_doubt, slope
 from damadics_fd.core.scada.laws.stem_law import outside, stem_doubt, transient_doubt
 from damadics_fd.core.scada.state import HISTORY_LENGTH, LAW, N_WEIGHTS, MonitorState, Reference
@@ -96,6 +97,7 @@ def residuals(
     entry.correction = correction
     entry.r1 = raw
     entry.r2 = s.residual[R2]
+    follow_roughness(s, ref, flow)
 
 
 @jit
