@@ -30,6 +30,7 @@ from damadics_fd.core.scada.naming.names import (
     EQUAL,
     GROUPS,
     NAMES,
+    TOLD_BY_FLOW,
     Hypothesis,
     Isolation,
     group_of,
@@ -54,9 +55,9 @@ LINGERS_S = 3.0  # after the last evidence the record still tells of the fault
 MINIMUM_ERROR = 1e-12
 INCIPIENT_ONLY = frozenset({3, 4, 5, 6, 9})  # no physical background as abrupt faults
 PROCESS_FIRST_S = 3.0
+FLOW_END, MOSTLY = 0.97, 0.9  # of the meter's range; share of the samples that show it
 ABRUPT_PRIOR = 8.0  # nats against them after an abrupt onset
 TWO_SIDED = frozenset({12, 13, 19})
-FLOW_FAULTS = frozenset({2, 3, 5, 6, 13, 18, 19})
 HYPOTHESES = tuple(n for n in NAMES if n not in (7, 17))
 GRID = (0.03, 0.15, 0.35, 0.6, 0.85)
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
@@ -206,7 +207,8 @@ class Isolator:
             best = ranking[0].cost
             shown = [Hypothesis(h.fault, h.strength, best - 10.0 * EQUAL) for h in shown]
         told = signs(state, ref, window)
-        return Isolation(float(state.t), len(window), (*shown, *ranking), told)
+        ended = float(np.mean(window['flow'] >= FLOW_END)) > MOSTLY
+        return Isolation(float(state.t), len(window), (*shown, *ranking), told, ended)
 
     def _window(self, state: MonitorState) -> np.ndarray:
         count = int(state.samples)
@@ -269,7 +271,7 @@ class Isolator:
         stem, flow = self._errors(
             window,
             faults if fault in STEM_FAULTS else None,
-            faults if fault in FLOW_FAULTS else None,
+            faults if fault in TOLD_BY_FLOW else None,
         )
         n = 0.5 * len(window)
         total = n * misfit(stem, self._variance[0])

@@ -5,6 +5,7 @@
 import math
 from dataclasses import dataclass
 
+TOLD_BY_FLOW = frozenset({2, 3, 5, 6, 13, 18, 19})
 EQUAL = 4.0  # nats within which two faults are not told apart
 MOST_NAMED = 3
 NAMES = {
@@ -59,12 +60,15 @@ class Isolation:
     :param samples: samples used.
     :param ranking: hypotheses in ascending order of cost.
     :param signs: what the signals show of it, with units.
+    :param flow_ended: the flow meter was at the end of its range: causes that only the flow tells
+        apart are guessed.
     """
 
     t: float
     samples: int
     ranking: tuple[Hypothesis, ...]
     signs: str = ''
+    flow_ended: bool = False
 
     @property
     def best(self) -> Hypothesis:
@@ -80,6 +84,11 @@ class Isolation:
     def candidates(self) -> tuple[int, ...]:
         """Return the faults that the record does not tell apart from the best one."""
         return tuple(h.fault for h in self.ranking if h.cost <= self.best.cost + EQUAL)
+
+    def worse_than(self, before: 'Isolation') -> bool:
+        """Tell whether an earlier ranking of the same fault knew what this one guesses."""
+        told = self.best.fault in TOLD_BY_FLOW and before.best.fault in TOLD_BY_FLOW
+        return told and before.visible and self.flow_ended and not before.flow_ended
 
     @property
     def visible(self) -> bool:
