@@ -248,6 +248,9 @@ def _row(row: EventRow, t: Texts) -> dict[str, Cell]:
         what, numbers, advice = headline(row, t)
     elif transition == FaultEvent.CLEARED and row['duration'] is not None:
         what = t('lasted', time=t.duration(row['duration']))
+    told = plain(row['text'] or '', SENTENCE)
+    if faults_of(row['cause'] or ''):  # the sentence says how much is off
+        advice = f'{told}. {advice}'
     return {
         'moment': t.moment(row['stamp']),
         'valve': row['valve'] or 'valve',
@@ -256,7 +259,7 @@ def _row(row: EventRow, t: Texts) -> dict[str, Cell]:
         'what': t(TRANSITIONS[transition]) if transition in TRANSITIONS else '?',
         'occurrence': row['occurrence'] or '',
         'ratio': of_limit(row['ratio'], t),
-        'text': f'{what} {numbers}'.strip() or plain(row['text'] or '', SENTENCE),
+        'text': f'{what} {numbers}'.strip() or told,
         'more': advice,
     }
 
