@@ -4,7 +4,7 @@
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import cache
 from pathlib import Path
 
@@ -91,16 +91,19 @@ class Scada(Detector):
     def isolate_at(self, samples: Floats, alarm: float, times: Sequence[float]) -> list[Diagnosis]:
         """Run again and isolate at given times; see `Detector`."""
         self.monitor.reset()
-        found = []
+        found: list[Isolation] = []
         done = 0
         for time in times:
             until = int(np.searchsorted(samples[:, 0], time, side='right'))
             self.monitor.run_samples(samples[done:until])
             done = until
             isolation = self.monitor.isolate()
-            if isolation is not None:
-                found.append(_diagnosis(isolation))
-        return found
+            if isolation is None:
+                continue
+            if found and isolation.worse_than(found[-1]):
+                isolation = replace(found[-1], t=isolation.t)
+            found.append(isolation)
+        return [_diagnosis(isolation) for isolation in found]
 
     def settings(self) -> dict[str, Setting]:
         """Return the settings of the monitor and a digest of its source, which holds margins."""

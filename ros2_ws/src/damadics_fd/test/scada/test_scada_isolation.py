@@ -2,11 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Isolation on the full plant at strengths that are on no grid."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from damadics_fd.core.scada.learning import learn
 from damadics_fd.core.scada.monitor import ScadaMonitor
 from damadics_fd.core.scada.naming.isolation import GROUPS, NAMES, group_of
+from damadics_fd.core.scada.naming.looks import Looks
+from damadics_fd.core.scada.naming.names import Hypothesis, Isolation
 from damadics_fd.core.scada.samples import scada_samples
 from damadics_fd.core.scada.settings import ScadaSettings
 
@@ -78,3 +82,34 @@ def test_isolation_does_not_touch_the_monitor(reference):
     assert monitor._state.tobytes() == before
     assert first == again
     assert np.isfinite([h.cost for h in first.ranking]).all()
+
+
+class Monitor:
+    """Stands for a monitor whose flow meter comes to the end of its range."""
+
+    def __init__(self, *rankings) -> None:
+        self.reference = True
+        self.rankings = list(rankings)
+        self.state = SimpleNamespace(
+            occurrence=1, t=1000.0, t_raised=1000.0, t_onset=999.0, test=0
+        )
+
+    def isolate(self):
+        return self.rankings.pop(0)
+
+
+def ranked(fault, other, *, ended):
+    ranking = (Hypothesis(fault, 0.4, 0.0), Hypothesis(other, 0.3, 9.0))
+    return Isolation(1000.0, 600, ranking, flow_ended=ended)
+
+
+def test_a_saturated_flow_meter_does_not_replace_what_was_known():
+    monitor = Monitor(
+        ranked(13, 18, ended=False), ranked(18, 13, ended=True), ranked(1, 4, ended=True)
+    )
+    looks = Looks()
+    told = []
+    for after in (0.0, 10.0, 60.0, 600.0):
+        monitor.state.t = 1000.0 + after
+        told.append(looks.judge(monitor).candidates)
+    assert told == [(), ('f13',), ('f13',), ('f1',)]  # the stem is seen whatever the flow shows

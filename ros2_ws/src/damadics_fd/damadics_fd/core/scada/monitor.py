@@ -220,12 +220,8 @@ class ScadaMonitor:
         since = self.state.t_evidence - self.state.t_onset
         key = (int(self.state.occurrence), int(16.0 * math.log2(max(since, 1.0))))
         if self._isolated is None or self._isolated[0] != key:
-            isolation = Isolator(self._record[0], self.reference[0]).isolate(self.state)
-            known = self._isolated
-            before = known[1] if known and known[0][0] == key[0] else None
-            if before and isolation and isolation.worse_than(before):
-                isolation = before
-            self._isolated = (key, isolation)
+            isolator = Isolator(self._record[0], self.reference[0])
+            self._isolated = (key, isolator.isolate(self.state))
         return self._isolated[1]
 
     @property

@@ -9,6 +9,7 @@ from dataclasses import replace
 from damadics_fd.core.judgement import Judgement
 from damadics_fd.core.scada.judging.cusum import TEST_NAMES
 from damadics_fd.core.scada.monitor import ScadaMonitor
+from damadics_fd.core.scada.naming.names import Isolation
 from damadics_fd.core.stamps import SECOND
 
 AFTER_S = (10.0, 60.0, 600.0, 3600.0, 21600.0)  # after an alarm
@@ -20,6 +21,7 @@ class Looks:
     def __init__(self) -> None:
         self._key = (0, 0)
         self._latest: Judgement | None = None
+        self._isolation: Isolation | None = None  # that it rests on
 
     def judge(self, monitor: ScadaMonitor) -> Judgement | None:
         """
@@ -34,31 +36,37 @@ class Looks:
         due = bisect.bisect_right(AFTER_S, float(state.t - state.t_raised))
         key = int(state.occurrence), due
         if self._latest is None or key != self._key:
-            before = self._latest if key[0] == self._key[0] else None
+            if key[0] != self._key[0]:
+                self._latest = self._isolation = None
             self._key = key
-            self._latest = _look(monitor, before, visible=due > 0)
+            self._latest = self._look(monitor, visible=due > 0)
         return self._latest
 
+    def _look(self, monitor: ScadaMonitor, visible: bool) -> Judgement:
+        before, known = self._latest, self._isolation
+        isolation = monitor.isolate() if visible else None
+        if isolation is None or (known is not None and isolation.worse_than(known)):
+            return before or _found(monitor)
+        self._isolation = isolation
+        names = tuple(f'f{fault}' for fault in isolation.candidates) if isolation.visible else ()
+        if before is not None and before.text and names == before.candidates:
+            return before
+        return replace(
+            _found(monitor),
+            candidates=names,
+            confidence=tuple(isolation.confidence.values()) if names else (),
+            strength=isolation.best.strength if names else math.nan,
+            text=isolation.text(),
+        )
 
-def _look(monitor: ScadaMonitor, before: Judgement | None, visible: bool) -> Judgement:
+
+def _found(monitor: ScadaMonitor) -> Judgement:
+    """Return what is known at once: the test and the onset."""
     state = monitor.state
-    now = Judgement(
+    return Judgement(
         round(float(state.t) * SECOND),
         int(state.occurrence),
         TEST_NAMES[int(state.test)],
         round(float(state.t_onset) * SECOND),
         'control-room test',
-    )
-    isolation = monitor.isolate() if visible else None
-    if isolation is None:
-        return before or now
-    names = tuple(f'f{fault}' for fault in isolation.candidates) if isolation.visible else ()
-    if before is not None and before.text and names == before.candidates:
-        return before
-    return replace(
-        now,
-        candidates=names,
-        confidence=tuple(isolation.confidence.values()) if names else (),
-        strength=isolation.best.strength if names else math.nan,
-        text=isolation.text(),
     )

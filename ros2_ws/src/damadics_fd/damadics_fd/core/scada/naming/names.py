@@ -86,7 +86,11 @@ class Isolation:
         return tuple(h.fault for h in self.ranking if h.cost <= self.best.cost + EQUAL)
 
     def worse_than(self, before: 'Isolation') -> bool:
-        """Tell whether an earlier ranking of the same fault knew what this one guesses."""
+        """
+        Tell whether an earlier ranking of the same fault knew what this one guesses.
+
+        :param before: the earlier one.
+        """
         told = self.best.fault in TOLD_BY_FLOW and before.best.fault in TOLD_BY_FLOW
         return told and before.visible and self.flow_ended and not before.flow_ended
 
