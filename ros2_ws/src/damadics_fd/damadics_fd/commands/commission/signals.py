@@ -64,7 +64,9 @@ class Blocks:
         inside = (self.x > STOPS) & (self.x < 1.0 - STOPS)
         fast = (np.abs(self.v) >= SLOWEST) & (np.abs(self.v) < FASTEST)
         one_way = (before * after > 0.0) & (steps.min(axis=0) >= least)
-        return inside & fast & one_way & np.isfinite(self.v)
+        mask: np.ndarray[tuple[int], np.dtype[np.bool_]] = inside & fast & one_way
+        mask &= np.isfinite(self.v)
+        return mask
 
     @property
     def standing(self) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
