@@ -96,6 +96,12 @@ def test_a_plug_that_the_flow_slams_shut_raises_no_alarm():
     assert (t.false_alarms, t.right) == (0, True)
 
 
+@pytest.mark.parametrize(('seed', 'sticks'), [(402, True), (25, False)])
+def test_a_stem_that_sticks_and_slips_is_told(seed, sticks):
+    proposal = commissioned(kinds.random_valve(seed), seed, minutes=10.0)
+    assert any('sticks and slips' in remark for remark in proposal.remarks) is sticks
+
+
 def test_stated_deviations_cover_the_truth():
     missed = []
     for seed in range(140, 146):

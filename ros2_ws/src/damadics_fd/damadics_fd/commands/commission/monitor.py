@@ -35,6 +35,7 @@ from damadics_fd.core.settings.identified import LIMITED, OK, REFUSED, FaultFree
 from damadics_fd.core.signature.settings import MIN_RATE
 
 SAME_SPRING = 0.05  # share by which the stiffness of recordings of one valve may differ
+JUMPY = 0.2  # share of jumps in the motion from which it is told
 SEEN = 1.5  # factor on the largest ratio seen: a limit is no lower
 
 
@@ -160,6 +161,13 @@ def _propose(
         limiting.append(
             f'the recording itself raises {len(result.detections)} alarms, the first at '
             f'{first:.1f} s: a fault in it? see --until'
+        )
+    jumps = blocks(gather(recordings), BLOCK, settings.ps_lag).jumps
+    if jumps > JUMPY:
+        remarks.append(
+            f'the stem sticks and slips ({100.0 * jumps:.0f} % of its motion are jumps): friction '
+            'is read up to a third too high and its changes too small, false alarms are likelier; '
+            'see to the packing, or to a positioner that hunts'
         )
     remarks += sheet_differs(balance, sheet, given)
     remarks += [f'not determined: {name}' for name in balance.undetermined]

@@ -58,15 +58,27 @@ class Blocks:
 
         :return: mask.
         """
+        return self._in_motion(STEADY)
+
+    @property
+    def jumps(self) -> float:
+        """
+        Tell how much of the motion is jumps: blocks in which the stem breaks away or stops.
+
+        :return: share of the blocks in motion.
+        """
+        every = int(np.sum(self._in_motion(0.0)))
+        return 1.0 - int(np.sum(self.moving)) / max(every, 1)
+
+    def _in_motion(self, steady: float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
         before, after = _steps(self)
-        steps = np.abs([before, after])
-        least = np.maximum(0.5 * SLOWEST * self.width, STEADY * steps.max(axis=0))
+        low = np.minimum(np.abs(before), np.abs(after))
+        high = np.maximum(np.abs(before), np.abs(after))
+        least = np.maximum(0.5 * SLOWEST * self.width, steady * high)
         inside = (self.x > STOPS) & (self.x < 1.0 - STOPS)
         fast = (np.abs(self.v) >= SLOWEST) & (np.abs(self.v) < FASTEST)
-        one_way = (before * after > 0.0) & (steps.min(axis=0) >= least)
-        mask: np.ndarray[tuple[int], np.dtype[np.bool_]] = inside & fast & one_way
-        mask &= np.isfinite(self.v)
-        return mask
+        one_way = (before * after > 0.0) & (low >= least)
+        return inside & fast & one_way & np.isfinite(self.v)
 
     @property
     def standing(self) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
