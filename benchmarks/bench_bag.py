@@ -5,6 +5,7 @@ Measure reading, replaying and recording of bags against their peers, side by si
 
     python benchmarks/bench_bag.py               # reading, replay, memory
     python benchmarks/bench_bag.py --recorder    # recorder with publishers in other processes
+    python benchmarks/bench_bag.py --topics 1000 # recorder beside a bare subscriber, 1 Hz each
 
 CPU times are those of one process with all its threads, wall times need a quiet machine; the best
 of several runs.
@@ -28,6 +29,7 @@ from damadics_fd.bag.mcap import loading
 from damadics_fd.bag.rosbag2 import qos
 from damadics_fd.core.sample import COLUMNS
 from damadics_plant import simulate
+from many_topics import many_topics
 from numpy.typing import NDArray
 
 SLOW_ROWS = 40_000  # read by the peers
@@ -228,6 +230,7 @@ def recorder(folder: Path, options: argparse.Namespace) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[0])
     parser.add_argument('--recorder', action='store_true')
+    parser.add_argument('--topics', type=int, default=0, help='record so many topics at 1 Hz')
     parser.add_argument('--rate', type=float, default=20_000.0, help='messages per second')
     parser.add_argument('--seconds', type=float, default=60.0)
     parser.add_argument('--publishers', type=int, default=2)
@@ -237,6 +240,9 @@ def main() -> None:
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
+        if options.topics:
+            many_topics(folder, options.topics, options.seconds)
+            return
         if options.recorder:
             recorder(folder, options)
             return

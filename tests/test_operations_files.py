@@ -284,10 +284,11 @@ def secured(tmp_path_factory):
     return folder / 'policy.xml'
 
 
-def rights(policy: Path, verb: str) -> dict[str, set[str]]:
+def rights(policy: Path | ET.ElementTree, verb: str) -> dict[str, set[str]]:
     """Return what the nodes may publish, subscribe, reply or request: full names by node."""
     found: dict[str, set[str]] = {}
-    for profile in ET.parse(policy).iter('profile'):
+    tree = ET.parse(policy) if isinstance(policy, Path) else policy
+    for profile in tree.iter('profile'):
         node = f'{profile.get("ns").rstrip("/")}/{profile.get("node")}'
         found[node] = {e.text.replace('~', node, 1) for e in profile.findall(f'*[@{verb}]/*')}
     return found

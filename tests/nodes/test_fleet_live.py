@@ -8,11 +8,13 @@ import time
 import numpy as np
 import pytest
 import yaml
+from damadics_bringup.policy import policy
 from damadics_fd.core.monitor import Chain
 from damadics_fd.core.sample import SIGNALS
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.text import SENTENCE
 from damadics_fd.ros import qos
+from damadics_fd.store.fleet_file import read_fleet
 from damadics_msgs.msg import (
     FaultEvent,
     FaultFlag,
@@ -132,6 +134,21 @@ def call(sender, kind, service: str, **request):
     return future.result()
 
 
+def assert_policy_allows(graph, file) -> None:
+    """With SROS 2 enforced, a node that may not make one of its topics does not start."""
+    made = {
+        'publish': graph.get_publisher_names_and_types_by_node('fleet', '/'),
+        'subscribe': graph.get_subscriber_names_and_types_by_node('fleet', '/'),
+        'reply': graph.get_service_names_and_types_by_node('fleet', '/'),
+    }
+    profiles = policy(read_fleet(file), blocks=True).getroot().iter('profile')
+    profile = next(p for p in profiles if p.get('node') == 'fleet')
+    for verb, topics in made.items():
+        allowed = {e.text.replace('~', '/fleet', 1) for e in profile.findall(f'*[@{verb}]/*')}
+        names = {name for name, _ in topics}
+        assert names and names <= allowed, f'fleet may not {verb} {names - allowed}'
+
+
 def test_fifty_valves_in_one_process(processes, peer, tmp_path):
     path = tmp_path / 'fleet.yaml'
     path.write_text(
@@ -154,6 +171,8 @@ def test_fifty_valves_in_one_process(processes, peer, tmp_path):
     assert set(fleet.status[-1].state) == {FaultFlag.STATE_NOT_MONITORING}
     assert peer.wait(lambda: sender.publisher.get_subscription_count() == 1)
     assert peer.wait(lambda: own.get_subscription_count() == 1)
+
+    assert_policy_allows(peer.node, path)
 
     # a block of another layout is refused, counted, and judged by nobody
     sender.send([0], [1], {'cv': np.array([0.5])})
@@ -194,6 +213,22 @@ def test_fifty_valves_in_one_process(processes, peer, tmp_path):
         message.header.stamp.nanosec = n * PERIOD
         own.publish(message)
     assert peer.wait(lambda: other_flags[-1].state == FaultFlag.STATE_HEALTHY)
+
+    # a gateway may number the valves by a list of its own, some of them of other fleets
+    layouts = peer.node.create_publisher(FleetLayout, 'fleet/layout', qos.FLAG)
+    names = ['/elsewhere', f'/{name(OTHER)}']
+    layouts.publish(FleetLayout(version=7, valve=names, actuator=['', ''], area=['', '']))
+    assert peer.wait(lambda: fleet.layouts[-1].version == 7)
+    assert peer.wait(lambda: layouts.get_subscription_count() == 2)
+    assert layouts.wait_for_all_acked()
+    refused = fleet.says('Refused of gateway')
+    version, sender.layout = sender.layout, 7
+    stamps = np.array([50, 50, 51, 51]) * PERIOD
+    half = np.full(4, 0.5)
+    sender.send([0, 1, 0, 1], stamps, {'cv': half, 'x1': half, 'ps': half})
+    assert peer.wait(lambda: other_flags[-1].header.stamp.nanosec == stamps[-1])
+    assert fleet.says('Refused of gateway') == refused
+    sender.layout = version
 
     # people act on one valve, some or all
     answer = call(sender, FleetAcknowledge, 'fleet/acknowledge', valves=['*'], user='Anna')

@@ -25,6 +25,7 @@ setup(
         'test': ['pytest', 'hypothesis'],
         'progpy': ['progpy'],  # test only: an independent plant
         'parquet': ['pyarrow'],
+        'cluster': ['dask[distributed]'],
         'compression': ['isal', 'lz4'],  # faster gzip and checksums; bags of others in LZ4
     },
     entry_points={

@@ -27,8 +27,13 @@ EXAMPLES = """examples:
   ros2 run damadics_bringup run --simulate --dashboard     one simulated valve and the web page
   ros2 run damadics_bringup run fleet.yaml --dashboard     your valves
   ros2 run damadics_bringup run fleet.yaml --record bags/today"""
+DEMO = Path(get_package_share_directory('damadics_bringup')) / 'config' / 'demo_valve.yaml'
 LOOK = 0.2  # s between two looks at the processes
-END = {'recorder': 60.0, 'monitors': 60.0}  # s to write what it has, to take leave of DDS for many
+END = {
+    'recorder': 60.0,
+    'monitors': 60.0,
+    'fleet': 60.0,
+}  # s to write what it has, to take leave of DDS for many
 NAMED = 8  # valves whose names are printed
 FOREVER = 1e8  # s of simulated time
 
@@ -107,7 +112,9 @@ def tasks_of(valves: list[Valve], options: argparse.Namespace) -> list[Task]:
             )
         )
     tasks += (
-        _together(valves, options.processes)
+        [_fleet(valves, options)]
+        if getattr(options, 'blocks', False)
+        else _together(valves, options.processes)
         if options.processes
         else [
             Task(
@@ -197,6 +204,13 @@ def _together(valves: list[Valve], processes: int) -> list[Task]:
     ]
 
 
+def _fleet(valves: list[Valve], options: argparse.Namespace) -> Task:
+    """Return the one process that takes blocks; simulated plants send valve by valve."""
+    exposed: Saved = {'expose': len(valves)} if options.simulate else {}
+    words = [str(options.fleet or DEMO), *arguments_of(exposed, enclave='/fleet')]
+    return Task('fleet', 'damadics_fd', 'fleet', words)
+
+
 def parser() -> argparse.ArgumentParser:
     """
     Describe the command line.
@@ -235,6 +249,12 @@ def parser() -> argparse.ArgumentParser:
         'of one process each (the default)',
     )
     p.add_argument(
+        '--blocks',
+        action='store_true',
+        help='run the node fleet instead, which judges all valves of the list in one process '
+        'and takes measurement_block',
+    )
+    p.add_argument(
         '--logs',
         type=Path,
         default=state_folder() / 'logs',
@@ -259,7 +279,7 @@ def greeting(valves: list[Valve], options: argparse.Namespace) -> str:
         'Ctrl-C ends all, a second one at once'
     ]
     cores = os.cpu_count() or 1
-    if not options.processes and len(valves) > cores:
+    if not (options.processes or options.blocks) and len(valves) > cores:
         lines.append(
             f'{2 * len(valves)} processes monitor them on {cores} cores: '
             f'--processes {cores} does it at half the cost'
@@ -282,8 +302,9 @@ def main(args: Sequence[str] | None = None) -> int:
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         if signal.getsignal(number) != signal.SIG_IGN or number != signal.SIGHUP:  # nohup
             signal.signal(number, lambda signum, frame: stop.append(signum))
-    share = Path(get_package_share_directory('damadics_bringup'))
     try:
+        if options.blocks and options.processes:
+            raise FleetError('--blocks is one process: leave out --processes')
         if options.processes < 0:
             raise FleetError(
                 '--processes: give a number of processes from 1, such as the cores of this machine'
@@ -293,7 +314,7 @@ def main(args: Sequence[str] | None = None) -> int:
         problem = missing_middleware() or (options.record and check_folder(options.record.parent))
         if problem:
             raise FleetError(problem)
-        valves = read_fleet(options.fleet or share / 'config' / 'demo_valve.yaml')
+        valves = read_fleet(options.fleet or DEMO)
         tasks = tasks_of(valves, options)
         with Processes(options.logs) as processes:
             keeper = Keeper(processes, tasks)

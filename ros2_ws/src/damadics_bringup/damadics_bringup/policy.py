@@ -15,8 +15,9 @@ from damadics_fd.store.fleet_file import FleetError, Valve, read_fleet
 
 from damadics_bringup.fleet import MONITORS, spread
 
-EXAMPLES = """example:
+EXAMPLES = """examples:
   ros2 run damadics_bringup policy fleet.yaml --out policy.xml
+  ros2 run damadics_bringup policy fleet.yaml --blocks --out policy.xml    with the node fleet
   ros2 security create_keystore keystore
   ros2 security generate_artifacts -k keystore -p policy.xml"""
 # what rclpy makes for every node: without the right to it, a node does not start
@@ -77,6 +78,19 @@ NODES = {  # of every valve
         ('measurement',), ('stroke_request',)
     ),  # of the plant: its name is for you to choose
 }
+EXPOSED = (
+    'fault_flag',
+    'fault_event',
+    'isolation',
+    'signature',
+    'estimate',
+    'residual',
+    'threshold',
+)
+FLEET_TOPICS = tuple(f'fleet/{name}' for name in ('layout', 'status', 'fault_event', 'isolation'))
+FLEET_SERVICES = tuple(
+    f'fleet/{name}' for name in ('acknowledge', 'reset', 'shelve', 'relearn', 'reference')
+)
 PLANT = Rights(('measurement', 'fault_state', '/clock'), ('stroke_request',), ('inject_fault',))
 
 
@@ -84,6 +98,7 @@ def policy(
     valves: Sequence[Valve],
     simulate: bool = False,
     processes: int = 0,
+    blocks: bool = False,
 ) -> 'ET.ElementTree[ET.Element]':
     """
     Write down what each node of a fleet may do.
@@ -91,6 +106,7 @@ def policy(
     :param valves: the fleet.
     :param simulate: also for the simulated plants.
     :param processes: as given to `run`: nodes of one process share its enclave.
+    :param blocks: as given to `run`: one node `fleet` judges all valves.
     :return: a document of the form that `ros2 security` takes (version 0.2.0).
     """
     root = ET.Element('policy', version='0.2.0')
@@ -100,14 +116,33 @@ def policy(
         for name, group in spread(list(valves), processes).items()
         for valve in group
     }
+    if blocks:
+        exposed = _all(valves, Rights(EXPOSED, ('measurement',)))
+        rights = Rights(
+            (*FLEET_TOPICS, 'operator_action', '/diagnostics', *exposed.publish),
+            ('fleet/layout', 'measurement_block', *exposed.subscribe),
+            FLEET_SERVICES,
+        )
+        _enclave(enclaves, '/', 'fleet', _of_root(rights))
+    nodes = {name: one for name, one in NODES.items() if not (blocks and name in MONITORS)}
     for valve in valves:
-        for node, rights in {**NODES, **({'plant': PLANT} if simulate else {})}.items():
+        for node, rights in {**nodes, **({'plant': PLANT} if simulate else {})}.items():
             shared = process_of.get(valve.name, '') if node in MONITORS else ''
             _enclave(enclaves, f'/{valve.name}', node, _of_valve(rights, valve), shared)
     operate = (*ACTIONS, 'inject_fault') if simulate else ACTIONS
     page = _all(valves, Rights((), SHOWN, (), operate))
     _enclave(
-        enclaves, '/', 'dashboard', Rights((), (*page.subscribe, '/diagnostics'), (), page.request)
+        enclaves,
+        '/',
+        'dashboard',
+        _of_root(
+            Rights(
+                (),
+                (*page.subscribe, *FLEET_TOPICS, 'operator_action', '/diagnostics'),
+                (),
+                (*page.request, *FLEET_SERVICES),
+            )
+        ),
     )
     events = [
         f'/{v.name}/{node}/transition_event' for v in valves for node in ('estimator', 'detector')
@@ -120,7 +155,7 @@ def policy(
             ('/diagnostics',),
             (
                 *_all(valves, Rights((), ALL)).subscribe,
-                *(f'/{n}' for n in ALL),
+                *(f'/{n}' for n in (*ALL, *FLEET_TOPICS, 'measurement_block')),
                 '/diagnostics',
                 '/rosout',
                 '/parameter_events',
@@ -144,10 +179,22 @@ def _of_valve(rights: Rights, valve: Valve) -> Rights:
     )
 
 
+def _of_root(rights: Rights) -> Rights:
+    """Give names their full form: those of a node that serves all valves."""
+
+    def full(names: Iterable[str]) -> list[str]:
+        return [name if name[0] in '/~' else f'/{name}' for name in names]
+
+    return Rights(
+        full(rights.publish), full(rights.subscribe), full(rights.reply), full(rights.request)
+    )
+
+
 def _all(valves: Iterable[Valve], rights: Rights) -> Rights:
     """Collect the rights in all valves."""
     each = [_of_valve(rights, valve) for valve in valves]
     return Rights(
+        publish=[name for one in each for name in one.publish],
         subscribe=[name for one in each for name in one.subscribe],
         request=[name for one in each for name in one.request],
     )
@@ -186,6 +233,9 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument('fleet', type=Path, help='list of the valves (YAML)')
     p.add_argument('--simulate', action='store_true', help='also for the simulated plants')
     p.add_argument('--processes', type=int, default=0, metavar='N', help='as given to run')
+    p.add_argument(
+        '--blocks', action='store_true', help='as given to run: one node fleet judges all valves'
+    )
     p.add_argument('--out', type=Path, metavar='FILE', help='write it here (standard output)')
     return p
 
@@ -199,7 +249,8 @@ def main(args: Sequence[str] | None = None) -> int:
     """
     options = parser().parse_args(args)
     try:
-        tree = policy(read_fleet(options.fleet), options.simulate, options.processes)
+        valves = read_fleet(options.fleet)
+        tree = policy(valves, options.simulate, options.processes, options.blocks)
         text = ET.tostring(tree.getroot(), encoding='unicode', xml_declaration=True) + '\n'
         if options.out:
             options.out.write_text(text)

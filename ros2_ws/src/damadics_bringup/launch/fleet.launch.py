@@ -22,6 +22,7 @@ def valves(context):
     """Describe the nodes of every valve in the list."""
     fleet = read_fleet(LaunchConfiguration('fleet').perform(context))
     together = spread(fleet, int(LaunchConfiguration('processes').perform(context)))
+    blocks = LaunchConfiguration('blocks').perform(context).lower() == 'true'
     actions = [
         Node(
             package='damadics_fd',
@@ -34,6 +35,21 @@ def valves(context):
         )
         for name, group in together.items()
     ]
+    if blocks:
+        simulate = LaunchConfiguration('simulate').perform(context).lower() == 'true'
+        actions = [
+            Node(
+                package='damadics_fd',
+                executable='fleet',
+                respawn=True,
+                respawn_delay=1.0,
+                arguments=[LaunchConfiguration('fleet')],
+                # simulated plants send valve by valve
+                parameters=[{'expose': len(fleet)}] if simulate else [],
+                ros_arguments=['--enclave', '/fleet'],
+                output='screen',
+            )
+        ]
     for valve in fleet:
         file = [str(valve.parameters)] if valve.parameters else []
         topics = list(valve.topics.items())
@@ -51,7 +67,7 @@ def valves(context):
                 output='screen',
             )
             for node in MONITORS
-            if not together
+            if not together and not blocks
         ]
         if valve not in simulated(fleet):
             continue  # it has a driver of its own
@@ -105,6 +121,11 @@ def generate_launch_description():
                 default_value='0',
                 description='run all estimators '
                 'and detectors in so many processes; 0: each in its own',
+            ),
+            DeclareLaunchArgument(
+                'blocks',
+                default_value='false',
+                description='one node fleet, which takes measurement_block, judges all valves',
             ),
             DeclareLaunchArgument(
                 'simulate',

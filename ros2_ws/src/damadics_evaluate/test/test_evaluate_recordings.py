@@ -3,6 +3,7 @@
 """Labelled recordings: labels, files of several kinds, indices and their intervals."""
 
 import csv
+import json
 import math
 
 import numpy as np
@@ -15,6 +16,7 @@ from damadics_evaluate.recordings.intervals import (
     share_interval,
 )
 from damadics_evaluate.recordings.labels import read_labels
+from damadics_fd.commands.replay.replay import main as replay
 from damadics_plant import simulate
 from damadics_plant.writer import open_writer
 
@@ -98,6 +100,46 @@ def test_parquet_and_dates(tmp_path):
         tmp_path, labels, tmp_path / 'a.parquet', '--map', 'x1=POS*0.01', '--detectors', 'fixed'
     )
     assert 0 <= float(rows[0]['t_dt']) <= 30
+
+
+def test_a_cluster_takes_a_folder_of_many_valves(tmp_path, capsys):
+    """Replay and evaluation give there what they give here, a file of many valves included."""
+    distributed = pytest.importorskip('distributed')
+    pyarrow = pytest.importorskip('pyarrow')
+    from pyarrow import parquet
+
+    folder = tmp_path / 'month'
+    folder.mkdir()
+    write_csv(folder / 'own.csv', valve(1500, [(1200, 1300)], seed=5))
+    some = [valve(1500, [(1200, 1300)], seed=1), valve(1500, [(1300, 1400)], seed=2)]
+    table = {name: np.concatenate([one[name] for one in some]) for name in some[0]}
+    table['valve'] = np.repeat(['/lv1', '/lv2'], 1500)
+    parquet.write_table(pyarrow.table(table), folder / 'two.parquet')
+    labels = (
+        'two.parquet,learn,0,900,\nown.csv,learn,0,900,\ntwo.parquet#/lv1,fault,1200,1300,f4\n'
+        'two.parquet#/lv2,fault,1300,1400,f4\nown.csv,fault,1200,1300,f4\n'
+    )
+    here, there = tmp_path / 'here.json', tmp_path / 'there.json'
+    words = [str(folder), '--mode', 'paper', '--set', 'sample_rate=1.0', '--jobs', '1']
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, dashboard_address=None, processes=True
+    ) as cluster:
+        address = ['--scheduler', cluster.scheduler_address]
+        assert replay([*words, '--out', str(there), *address]) == 0
+        rows = run(tmp_path, labels, folder, '--detectors', 'fixed', *address)
+    assert replay([*words, '--out', str(here)]) == 0
+    speeds = 'samples_per_s'
+    found, wanted = (
+        [{k: v for k, v in one.items() if k != speeds} for one in json.loads(file.read_text())]
+        for file in (there, here)
+    )
+    assert found == wanted
+    assert [one['bag'].rpartition('/')[2] for one in found] == ['own.csv', 'lv1', 'lv2']
+    assert [one['samples'] for one in found] == [1500] * 3
+    assert rows == run(tmp_path, labels, folder, '--detectors', 'fixed')
+    assert len(rows) == 3 and all(0 <= float(row['t_dt']) <= 30 for row in rows)
+    assert replay([*words, '--scheduler', 'tcp://127.0.0.1:9']) == 1
+    assert 'tcp://127.0.0.1:9' in capsys.readouterr().err
 
 
 def test_bags_are_read(tmp_path):

@@ -20,6 +20,7 @@ from damadics_dashboard.live.calls import Field, Service
 from damadics_dashboard.live.valve import Membership, Valve
 
 Meet = Callable[[str], Valve]
+MOST_LAYOUTS = 100  # that are told apart: anybody may send one
 SERVICES: dict[str, tuple[str, Service, dict[str, Field]]] = {  # of one valve: those of a fleet
     'acknowledge': ('acknowledge', FleetAcknowledge, {}),
     'reset': ('reset', FleetReset, {}),
@@ -53,8 +54,7 @@ class FleetReport:
     def __init__(self, meet: Meet, topic: str) -> None:
         self._meet = meet
         self._topic = topic
-        self._version = -1
-        self._valves: list[Valve] = []
+        self._layouts: dict[int, list[Valve]] = {}  # a gateway has one of its own
 
     def take_layout(self, message: FleetLayout) -> None:
         """
@@ -62,23 +62,26 @@ class FleetReport:
 
         :param message: the layout.
         """
-        self._version = message.version
-        self._valves = []
+        valves: list[Valve] = []
+        self._layouts[message.version] = valves
+        while len(self._layouts) > MOST_LAYOUTS:
+            del self._layouts[next(iter(self._layouts))]
         for name, tag, area in zip(message.valve, message.actuator, message.area, strict=False):
             valve = self._meet(name.strip('/'))
             valve.tag = plain(tag, NAME)
             valve.area = plain(area, NAME)
             valve.fleet = Membership(self._topic, name)
-            self._valves.append(valve)
+            valves.append(valve)
 
     def take_status(self, message: FleetStatus, now: float) -> None:
         """
         Take the judgement of the valves that are reported.
 
-        :param message: the status; one of another layout than the last one is left out.
+        :param message: the status; one of a layout that is not known is left out.
         :param now: monotonic time [s].
         """
-        if message.layout != self._version:
+        valves = self._layouts.get(message.layout)
+        if valves is None:
             return
         made = message.header.stamp.sec * NANO + message.header.stamp.nanosec
         columns = (
@@ -88,14 +91,14 @@ class FleetReport:
         for n, state, level, fault, residual, threshold, ratio, age, progress, since in zip(
             *columns, strict=False
         ):
-            if n >= len(self._valves):
+            if n >= len(valves):
                 continue
             flag = FaultFlag(state=int(state), level=int(level), fault=bool(fault))
             flag.residual, flag.threshold = float(residual), float(threshold)
             judged = made - int(age * NANO) if math.isfinite(age) else made
             for field, stamp in ((flag.header.stamp, judged), (flag.since, int(since))):
                 field.sec, field.nanosec = divmod(max(stamp, 0), NANO)
-            valve = self._valves[int(n)]
+            valve = valves[int(n)]
             flag.onset = flag.since
             flag.header.frame_id = valve.tag
             flag.occurrence = valve.occurrence

@@ -12,6 +12,8 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TextIO
 
+from damadics_fd.commands.cluster import cluster
+
 from damadics_evaluate.baselines import DETECTORS
 from damadics_evaluate.benchmark.campaign import (
     CALIBRATION_SEED,
@@ -193,9 +195,5 @@ def _executor(jobs: int | None, scheduler: str | None) -> Iterator[Executor]:
         with ProcessPoolExecutor(jobs or os.cpu_count(), mp_context=context) as pool:
             yield pool
         return
-    try:
-        from distributed import Client
-    except ImportError as error:
-        raise ImportError('--scheduler needs Dask: pip install "dask[distributed]"') from error
-    with Client(scheduler, timeout='15s') as client:  # type: ignore[no-untyped-call]
-        yield client.get_executor(pure=False)
+    with cluster(scheduler) as executor:
+        yield executor

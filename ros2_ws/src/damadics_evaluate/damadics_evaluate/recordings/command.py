@@ -4,7 +4,10 @@
 
 import argparse
 import sys
+from contextlib import nullcontext
 from pathlib import Path
+
+from damadics_fd.commands.cluster import cluster
 
 from damadics_evaluate.baselines import DETECTORS
 from damadics_evaluate.detectors.find import find_detector
@@ -57,6 +60,11 @@ def add_parser(commands: 'argparse._SubParsersAction[argparse.ArgumentParser]') 
     parser.add_argument(
         '--after', type=float, default=120.0, metavar='S', help='not counted after a fault (120)'
     )
+    parser.add_argument(
+        '--scheduler',
+        metavar='ADDRESS',
+        help='Dask scheduler, tcp://host:port, whose workers take a recording each',
+    )
     parser.add_argument('--csv', type=Path, metavar='FILE', help='one line per event and detector')
 
 
@@ -79,7 +87,8 @@ def recordings(arguments: argparse.Namespace) -> None:
         arguments.recordings, arguments.map, arguments.actuator, arguments.period, tell
     )
     rules = Rules(arguments.before, arguments.after)
-    table = evaluate(found, labels, arguments.detectors, rules, tell)
+    with cluster(arguments.scheduler) if arguments.scheduler else nullcontext() as executor:
+        table = evaluate(found, labels, arguments.detectors, rules, tell, executor)
     print(as_text(table))
     if arguments.csv:
         write_csv(table, arguments.csv)

@@ -4,6 +4,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor, Future
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -78,6 +79,17 @@ class Table:
     days: dict[str, float] = field(default_factory=dict)
     refused: list[str] = field(default_factory=list)
 
+    def add(self, other: 'Table') -> None:
+        """
+        Take in the results of other recordings.
+
+        :param other: with the same detectors.
+        """
+        self.events += other.events
+        self.false_alarms |= other.false_alarms
+        self.days |= other.days
+        self.refused += other.refused
+
 
 def evaluate(
     recordings: Mapping[str, Columns],
@@ -85,6 +97,7 @@ def evaluate(
     detectors: Sequence[str],
     rules: Rules,
     tell: Callable[[str], None],
+    executor: Executor | None = None,
 ) -> Table:
     """
     Run all detectors over all recordings.
@@ -94,6 +107,7 @@ def evaluate(
     :param detectors: names.
     :param rules: what counts.
     :param tell: told what is being done.
+    :param executor: runs each recording by itself; None for this process.
     :return: the table.
     :raises ValueError: where a label names no recording, or nothing is labelled to learn from.
     """
@@ -112,19 +126,38 @@ def evaluate(
         for (label, zero) in own[name]
         if label.kind == LEARN
     ]
+    waiting: list[Future[Table]] = []
     for name, columns in recordings.items():
         here = [(label, zero) for label, zero in own[name] if label.kind == LEARN]
         parts = [cut(columns, a.start + z, a.end + z) for a, z in here] or everywhere
-        _one(table, name, columns, [a for a, _ in own[name]], _pooled(parts), rules, tell)
+        labelled, learning = [a for a, _ in own[name]], _pooled(parts)
+        if executor is None:
+            table.add(_one(table.detectors, name, columns, labelled, learning, rules, tell))
+        else:
+            waiting.append(
+                executor.submit(
+                    _one, table.detectors, name, columns, labelled, learning, rules, _silent
+                )
+            )
+    for name, future in zip(recordings, waiting, strict=False):
+        table.add(future.result())
+        tell(f'{name}: done')
     return table
+
+
+def _silent(text: str) -> None:
+    """Tell nobody: the process that does the work has no terminal."""
 
 
 def _own(name: str, columns: Columns, labels: Sequence[Label]) -> list[tuple[Label, float]]:
     """Return the labels of one recording, in s since its first sample, and that zero."""
     zero = float(columns['stamp'][0]) / NANOSECONDS
+    path, hash_, part = name.partition('#')  # file#valve, where a file holds several
+    file = Path(path).name
+    names = {name, Path(name).name, file, f'{file}{hash_}{part}'}
     found = []
     for label in labels:
-        if label.recording not in (name, Path(name).name, Path(name.partition('#')[0]).name):
+        if label.recording not in names:
             continue
         found.append((label, 0.0 if label.start > DATE else zero))
     return found
@@ -148,14 +181,16 @@ def _pooled(parts: Sequence[Columns]) -> Columns:
 
 
 def _one(
-    table: Table,
+    detectors: tuple[str, ...],
     name: str,
     columns: Columns,
     labels: Sequence[Label],
     learning: Columns,
     rules: Rules,
     tell: Callable[[str], None],
-) -> None:
+) -> Table:
+    """Run all detectors over one recording."""
+    table = Table(detectors)
     zero = 0.0 if any(a.start > DATE for a in labels) else float(columns['stamp'][0]) / NANOSECONDS
     t = columns['stamp'] / NANOSECONDS - zero
     learned = [a for a in labels if a.kind == LEARN]
@@ -181,6 +216,7 @@ def _one(
         ]
         wrong = [a for a in moved if counted[np.searchsorted(t, a.start).clip(0, len(t) - 1)]]
         table.false_alarms[detector, name] = wrong
+    return table
 
 
 def _event(

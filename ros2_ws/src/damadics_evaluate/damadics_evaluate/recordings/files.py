@@ -6,13 +6,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from damadics_fd.bag.blocks.together import read_together, source_of
 from damadics_fd.bag.errors import BagError
-from damadics_fd.bag.mapping import Source
 from damadics_fd.bag.recording import Recording, find_recordings, parse_maps
 
 from damadics_evaluate.columns import NANOSECONDS, SIGNALS, Columns
-
-PARQUET = '.parquet'
 
 
 def read_recordings(
@@ -30,57 +28,41 @@ def read_recordings(
     :param actuator: of a table with the tags of the plant of Lublin.
     :param period: s; faster recordings are thinned to it.
     :param tell: told of everything that is left out.
-    :return: columns by name of the recording.
+    :return: columns by name of the recording, one for each valve.
     :raises ValueError: where a recording cannot be read.
     """
     found: dict[str, Columns] = {}
-    for path in paths:
-        if path.suffix.lower() == PARQUET:
-            found[str(path)] = thinned(_parquet(path, maps), period)
+    try:
+        recordings = find_recordings(paths, maps=parse_maps(maps), actuator=actuator)
+        together: dict[object, list[Recording]] = {}
+        for number, recording in enumerate(recordings):
+            together.setdefault(source_of(recording) or number, []).append(recording)
+        for some in together.values():
+            found |= {
+                name: thinned(columns, period) for name, columns in _columns(some, tell).items()
+            }
+    except BagError as error:
+        raise ValueError(str(error)) from error
+    return {one.name: found[one.name] for one in recordings if one.name in found}
+
+
+def _columns(recordings: list[Recording], tell: Callable[[str], None]) -> dict[str, Columns]:
+    """Read one recording, or the valves of one file in one pass."""
+    parts: dict[str, list[Columns]] = {one.name: [] for one in recordings}
+    if source_of(recordings[0]):
+        for number, piece in read_together(recordings, tell):
+            parts[recordings[number].name].append(piece)
+    else:
+        parts[recordings[0].name] += recordings[0].chunks(tell)
+    columns: dict[str, Columns] = {}
+    for name, pieces in parts.items():
+        if not sum(len(piece['stamp']) for piece in pieces):
+            if len(parts) == 1:
+                raise ValueError(f'{name}: holds no sample')
+            tell(f'{name}: holds no sample and is left out')
             continue
-        try:
-            for recording in find_recordings([path], maps=parse_maps(maps), actuator=actuator):
-                found[recording.name] = thinned(_columns(recording, tell), period)
-        except BagError as error:
-            raise ValueError(str(error)) from error
-    return found
-
-
-def _columns(recording: Recording, tell: Callable[[str], None]) -> Columns:
-    parts = list(recording.chunks(tell))
-    if not parts or not sum(len(part['stamp']) for part in parts):
-        raise ValueError(f'{recording.name}: holds no sample')
-    names = [name for name in ('stamp', *SIGNALS) if all(name in part for part in parts)]
-    return {name: np.concatenate([part[name] for part in parts]) for name in names}
-
-
-def _parquet(path: Path, texts: list[str]) -> Columns:
-    """Read a Parquet file: `stamp` (ns) or `t` (s), and the signals by name or map."""
-    try:
-        from pyarrow import ArrowException, parquet
-    except ImportError as error:
-        raise ValueError(f'{path}: Parquet needs pyarrow: pip install pyarrow') from error
-    try:
-        table = parquet.read_table(path)
-    except (OSError, ArrowException) as error:
-        raise ValueError(f'{path}: cannot be read as Parquet: {error}') from error
-    maps = parse_maps(texts)
-    columns: Columns = {}
-    for signal in ('stamp', 't', *SIGNALS):
-        source = maps.get(signal, Source(signal))
-        if source.name in table.column_names:
-            values = table[source.name].to_numpy()
-            columns[signal] = source.scale(values) if signal in maps else values
-    if 'stamp' not in columns and 't' in columns:
-        columns['stamp'] = np.round(columns['t'] * NANOSECONDS)
-    columns.pop('t', None)
-    missing = [name for name in ('stamp', 'cv', 'x1') if name not in columns]
-    if missing:
-        raise ValueError(
-            f'{path}: no {", ".join(missing)}; it has {", ".join(table.column_names)}; name them: '
-            '--map cv=COLUMN'
-        )
-    columns['stamp'] = columns['stamp'].astype('datetime64[ns]').astype(np.int64)
+        kept = [kind for kind in ('stamp', *SIGNALS) if all(kind in piece for piece in pieces)]
+        columns[name] = {kind: np.concatenate([piece[kind] for piece in pieces]) for kind in kept}
     return columns
 
 

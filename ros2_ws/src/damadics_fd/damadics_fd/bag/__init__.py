@@ -4,23 +4,36 @@
 Recordings: MCAP bags in and out, as columns.
 
 `read_columns` and `iter_columns` read a topic of any bag; `BagWriter` and `write_columns` write
-one; `BagError` is the one error of them all.
+one; `BlockReader` reads blocks of many valves, `write_parquet` makes a table of them; `BagError`
+is the one error of them all.
 """
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from damadics_fd.bag.blocks.reader import BlockReader
     from damadics_fd.bag.columns import iter_columns, read_columns
     from damadics_fd.bag.errors import BagError
+    from damadics_fd.bag.tables.parquet_out import write_parquet
     from damadics_fd.bag.writing.bag_writer import BagWriter
     from damadics_fd.bag.writing.columns_out import write_columns
 
-__all__ = ['BagError', 'BagWriter', 'iter_columns', 'read_columns', 'write_columns']
+__all__ = [
+    'BagError',
+    'BagWriter',
+    'BlockReader',
+    'iter_columns',
+    'read_columns',
+    'write_columns',
+    'write_parquet',
+]
 _HOMES = {
     'BagError': 'errors',
     'BagWriter': 'writing.bag_writer',
+    'BlockReader': 'blocks.reader',
     'write_columns': 'writing.columns_out',
+    'write_parquet': 'tables.parquet_out',
     'iter_columns': 'columns',
     'read_columns': 'columns',
 }

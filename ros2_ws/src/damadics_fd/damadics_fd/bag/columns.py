@@ -35,6 +35,7 @@ def read_columns(
     topic: str = '/measurement',
     fields: Sequence[str] | None = None,
     *,
+    valve: str = '',
     on_problem: Callable[[str], None] | None = None,
     limits: Limits = Limits(),
 ) -> Columns:
@@ -45,6 +46,8 @@ def read_columns(
     :param topic: name of the topic.
     :param fields: fields to read; None for all that are numbers. Members of members have dotted
         names, `frame_id` is that of the header.
+    :param valve: namespace of a valve: of blocks of many valves (`MeasurementBlock`), the rows of
+        this one, as if it had a topic of its own.
     :param on_problem: told each damaged place, which is then left out; None makes it an error.
     :param limits: what the file may ask for.
     :return: `log_time` and, where the message has a header, `stamp` (int64, ns); the fields by
@@ -52,10 +55,12 @@ def read_columns(
         the order of the file.
     :raises BagError: where the bag cannot be read, lacks the topic or a field.
     """
-    whole = _read_whole(path, topic, fields, limits)
+    whole = None if valve else _read_whole(path, topic, fields, limits)
     if whole is not None:
         return whole
-    parts = list(iter_columns(path, topic, fields, on_problem=on_problem, limits=limits))
+    parts = list(
+        iter_columns(path, topic, fields, valve=valve, on_problem=on_problem, limits=limits)
+    )
     names = parts[0].keys()
     if len(parts) == 1:
         return parts[0]
@@ -90,6 +95,7 @@ def iter_columns(
     topic: str = '/measurement',
     fields: Sequence[str] | None = None,
     *,
+    valve: str = '',
     on_problem: Callable[[str], None] | None = None,
     limits: Limits = Limits(),
 ) -> Iterator[Columns]:
@@ -101,6 +107,13 @@ def iter_columns(
     :return: the columns of each chunk, at least once.
     :raises BagError: as `read_columns`.
     """
+    if valve:
+        from damadics_fd.bag.blocks.reader import (
+            valve_columns,  # which reads blocks with this function
+        )
+
+        yield from valve_columns(path, topic, valve, fields, on_problem, limits)
+        return
     seen: set[str] = set()
     empty: Columns | None = None
     delivered = False

@@ -2,16 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Anything that holds measurements of a valve, as a stream of columns."""
 
-import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import numpy as np
-
-from damadics_fd.bag.arrays import Column, Columns, Places
+from damadics_fd.bag.arrays import Columns
+from damadics_fd.bag.blocks.layouts import BLOCK
+from damadics_fd.bag.blocks.reader import BlockReader
 from damadics_fd.bag.cdr.definition import full_name
+from damadics_fd.bag.cdr.mapped import mapped
 from damadics_fd.bag.columns import iter_columns, listing, open_files, read_columns
 from damadics_fd.bag.errors import BagError, NoMeasurementError
 from damadics_fd.bag.mapping import SIGNALS, Source, parse_maps
@@ -21,7 +21,6 @@ from damadics_fd.bag.tables.table import Table, read_table
 TABLES = ('.csv', '.txt', '.tsv', '.parquet', '.pq')
 MEASUREMENT = 'damadics_msgs/msg/Measurement'
 __all__ = ['SIGNALS', 'Recording', 'find_recordings', 'parse_maps']
-_ELEMENT = re.compile(r'\[(\d+)\]$')  # of an array
 MOST_VALVES = 1000  # in one bag that are replayed without being asked for
 Told = Callable[[str], None]
 
@@ -35,20 +34,31 @@ class Recording:
     :param topic: topic of the measurements in a bag.
     :param maps: where signals are, if not in a `Measurement`.
     :param table: the table, where it is one.
+    :param valve: namespace of the valve where the topic holds blocks of many.
+    :param tag: tag of the actuator, where blocks name it.
     """
 
     path: Path
     topic: str = '/measurement'
     maps: Mapping[str, Source] = field(default_factory=dict)
     table: Table | None = None
+    valve: str = ''
+    tag: str = ''
 
     @property
     def name(self) -> str:
         """What to call it."""
         if self.table and self.table.name:
             return f'{self.path}#{self.table.name}'
+        if self.valve:
+            return f'{self.path}#{self.valve}'
         special = not self.maps and self.topic != '/measurement' and not self.table
         return f'{self.path}#{self.topic}' if special else str(self.path)
+
+    @property
+    def place(self) -> str:
+        """Namespace of the valve in its bag, with a slash behind."""
+        return f'{self.valve}/' if self.valve else self.topic.removesuffix('measurement')
 
     def chunks(self, on_problem: Told) -> Iterator[Columns]:
         """
@@ -60,9 +70,11 @@ class Recording:
         if self.table:
             yield from self.table.chunks(on_problem)
         elif self.maps:
-            yield self._mapped(on_problem)
+            yield mapped(self.path, self.maps, on_problem)
         else:
-            for columns in iter_columns(self.path, self.topic, on_problem=on_problem):
+            for columns in iter_columns(
+                self.path, self.topic, valve=self.valve, on_problem=on_problem
+            ):
                 if not {'cv', 'x1'} <= columns.keys():
                     raise BagError(
                         f'{self.topic} has no field cv or x1; it has {listing(columns)}. Name the'
@@ -75,92 +87,12 @@ class Recording:
         """Return `stamp`, `fault` and `strength` where a bag has them."""
         if self.table or self.maps:
             return None
-        topic = self.topic.removesuffix('measurement') + 'fault_state'
         try:
-            return read_columns(self.path, topic, ['fault', 'strength'], on_problem=on_problem)
+            return read_columns(
+                self.path, self.place + 'fault_state', ['fault', 'strength'], on_problem=on_problem
+            )
         except BagError:
             return None  # real valves do not tell
-
-    def _mapped(self, on_problem: Told) -> Columns:
-        """Read signals from several topics; each holds its value until its next message."""
-        parsed: dict[str, tuple[str, str, int | None]] = {}
-        for signal, source in self.maps.items():
-            topic, dot, name = source.name.partition('.')
-            if not dot:
-                raise BagError(f'--map {signal}={source.name}: write /topic.field', self.path)
-            index = _ELEMENT.search(name)
-            parsed[signal] = (
-                topic,
-                _ELEMENT.sub('', name),
-                int(index[1]) if index else None,
-            )
-        if not {'cv', 'x1'} <= parsed.keys():
-            raise BagError('--map must name at least cv and x1', self.path)
-        read = {
-            topic: read_columns(
-                self.path,
-                topic,
-                sorted({name for other, name, _ in parsed.values() if other == topic}),
-                on_problem=on_problem,
-            )
-            for topic in {topic for topic, _, _ in parsed.values()}
-        }
-        clock = self._clock(read)
-        base = read[parsed['x1'][0]][clock]
-        columns: Columns = {'stamp': base}
-        for signal, (topic, name, element) in parsed.items():
-            values = np.asarray(read[topic][name], float)
-            if values.ndim > 1 and element is not None and element < values.shape[1]:
-                values = values[:, element]
-            if values.ndim != 1:
-                raise BagError(
-                    f'--map {signal}={topic}.{name}: the field is an array of'
-                    f' {values.shape[1]}; write {topic}.{name}[0]',
-                    self.path,
-                )
-            scaled = self.maps[signal].scale(values)
-            columns[signal] = hold(read[topic][clock], scaled, base)
-        known = np.isfinite(columns['cv'])
-        if len(base) and not known.any():
-            raise BagError(
-                f'--map: no message of {parsed["cv"][0]} comes before the last one of'
-                f' {parsed["x1"][0]}',
-                self.path,
-            )
-        return {name: column[known] for name, column in columns.items()}
-
-    def _clock(self, read: Mapping[str, Columns]) -> str:
-        """
-        Choose the one clock for signals of several topics: their stamps where all have them.
-
-        :raises BagError: where the recorder's clock cannot serve instead.
-        """
-        unstamped = [topic for topic, columns in read.items() if 'stamp' not in columns]
-        if not unstamped:
-            return 'stamp'
-        for topic, columns in read.items():
-            logged = columns['log_time']
-            if len(logged) > 1 and logged[0] == logged[-1]:
-                raise BagError(
-                    f'--map: {", ".join(sorted(unstamped))} has no header.stamp, and all messages'
-                    f' of {topic} were logged at the same instant: these topics have no clock in'
-                    ' common',
-                    self.path,
-                )
-        return 'log_time'
-
-
-def hold(stamp: Places, values: Column, at: Places) -> Column:
-    """
-    Return the latest value at each instant, NaN before the first.
-
-    >>> hold(np.array([10, 20]), np.array([1.0, 2.0]), np.array([5, 10, 15, 25]))
-    array([nan,  1.,  1.,  2.])
-    """
-    if not len(stamp):
-        return np.full(len(at), np.nan)
-    index = np.searchsorted(stamp, at, side='right') - 1
-    return np.where(index >= 0, values[index], np.nan)
 
 
 def find_recordings(
@@ -228,33 +160,69 @@ def _recordings(
             return [Recording(path, table=part) for part in read_table(path, actuator, maps)]
         if maps:
             return [Recording(path, maps=maps)]
+        kinds, counts = _topics(path)
+        blocks = [name for name, kind in sorted(kinds.items()) if kind == BLOCK and counts[name]]
         if topic:
-            return [Recording(path, topic)]
-        topics = measurement_topics(path)
+            return _named(path, topic, [*kinds], blocks)
+        topics = _measurements(kinds, counts)
     except BagError as error:
         problems.append(error)
         return []
+    found: list[Recording] = []
+    for name in blocks:
+        try:
+            found += _in_blocks(path, name)
+        except BagError as error:
+            problems.append(error)
+    if not topics and not blocks:
+        problems.append(
+            NoMeasurementError(
+                f'has no measurement; it has {listing(kinds)}. Name the'
+                ' signals: --map cv=/topic.field --map x1=/topic.field',
+                path,
+            )
+        )
     if len(topics) > MOST_VALVES:
         problems.append(
             BagError(
                 f'holds {len(topics)} valves, more than {MOST_VALVES}: name one: --topic', path
             )
         )
-        return []
+        return found
     problems += [
         NoMeasurementError(f'the topic {name} is empty', path)
         for name, count in topics.items()
         if not count
     ]
-    return [Recording(path, name) for name, count in topics.items() if count]
+    return [*(Recording(path, name) for name, count in topics.items() if count), *found]
 
 
-def measurement_topics(path: Path) -> dict[str, int]:
+def _in_blocks(path: Path, topic: str) -> list[Recording]:
+    """List the valves of the blocks of a topic."""
+    reader = BlockReader(path, topic, lambda text: None)  # what is odd is told when it is replayed
+    return [Recording(path, topic, valve=name, tag=reader.tags[name]) for name in reader.names]
+
+
+def _named(
+    path: Path, topic: str, present: Sequence[str], blocks: Sequence[str]
+) -> list[Recording]:
+    """Return what `--topic` names: a topic, all valves of blocks, or one of these valves."""
+    bare = topic.lstrip('/')
+    for name in (topic, '/' + bare, bare):
+        if name in blocks:
+            return _in_blocks(path, name)
+        if name in present:
+            return [Recording(path, topic)]
+    valve = '/' + bare.removesuffix('/measurement').strip('/')
+    found = [one for name in blocks for one in _in_blocks(path, name) if one.valve == valve]
+    return found or [Recording(path, topic)]
+
+
+def _topics(path: Path) -> tuple[dict[str, str], Counter[str]]:
     """
-    Count the messages of the topics of a bag that hold measurements of a valve.
+    List the topics of a bag.
 
-    :return: at least one topic; where the file does not tell, its messages count as one.
-    :raises NoMeasurementError: where there is none.
+    :return: type and number of messages of each; where the file does not tell, these count as one.
     :raises BagError: where it cannot be read.
     """
     kinds: dict[str, str] = {}
@@ -274,15 +242,13 @@ def measurement_topics(path: Path) -> dict[str, int]:
             counts[channel.topic] += sizes.get(channel.id, 0) if sizes else 1
     if damage and not kinds:
         raise BagError(f'{damage[0]}, and nothing in it can be read', path)
-    topics = {
+    return kinds, counts
+
+
+def _measurements(kinds: Mapping[str, str], counts: Mapping[str, int]) -> dict[str, int]:
+    """Count the messages of the topics of a bag that hold measurements of one valve each."""
+    return {
         topic: counts[topic]
         for topic, kind in sorted(kinds.items())
         if kind == MEASUREMENT or topic.rsplit('/', 1)[-1] == 'measurement'
     }
-    if not topics:
-        raise NoMeasurementError(
-            f'has no measurement; it has {listing(kinds)}. Name the'
-            ' signals: --map cv=/topic.field --map x1=/topic.field',
-            path,
-        )
-    return topics

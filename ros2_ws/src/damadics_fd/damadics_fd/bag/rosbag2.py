@@ -8,7 +8,6 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
-from pathlib import Path
 from typing import Union
 
 import yaml
@@ -27,7 +26,7 @@ _MOST_PROFILES = 100  # publishers of one topic that are kept
 _PLAIN = re.compile(r'[A-Za-z/][\w/.-]*')
 DEEPEST = 64  # lists and maps within each other
 _BRACKET = re.compile(r'[\[\]{}]')
-_INTEGER = re.compile(r'-?\d{1,19}')
+INTEGER = re.compile(r'-?\d{1,19}')
 # scalars stay text, so that no tag and no date of a hostile file is ever made into something
 _LOADER = getattr(yaml, 'CBaseLoader', yaml.BaseLoader)
 _DUMPER = getattr(yaml, 'CSafeDumper', yaml.SafeDumper)
@@ -233,71 +232,13 @@ def _profile(entry: Mapping[str, Yaml]) -> QosProfile:
     profile: dict[str, Value] = {}
     for name, value in entry.items():
         if name in _WORDS and isinstance(value, str) and len(value) < 64:
-            profile[name] = int(value) if _INTEGER.fullmatch(value) else value
+            profile[name] = int(value) if INTEGER.fullmatch(value) else value
         elif name == _CONVENTIONS and isinstance(value, str):
             profile[name] = value.lower() == 'true'
         elif name in _SPANS and isinstance(value, dict):
             parts = {part: value.get(part) for part in ('sec', 'nsec')}
             profile[name] = {
-                part: int(number) if isinstance(number, str) and _INTEGER.fullmatch(number) else 0
+                part: int(number) if isinstance(number, str) and INTEGER.fullmatch(number) else 0
                 for part, number in parts.items()
             }
     return profile
-
-
-@dataclass(frozen=True)
-class Stated:
-    """
-    What an existing `metadata.yaml` says about a bag.
-
-    :param files: names of its files, in order.
-    :param counts: messages by topic; empty where it is not said.
-    :param messages: all of them, -1 where it is not said.
-    :param compression: `FILE`, `MESSAGE` or ''.
-    """
-
-    files: tuple[str, ...] = ()
-    counts: Mapping[str, int] = field(default_factory=dict)
-    messages: int = -1
-    compression: str = ''
-
-
-def read_metadata(folder: Path, limits: Limits = Limits()) -> Stated | None:
-    """
-    Read `metadata.yaml` of a bag directory.
-
-    :return: None where it is absent or unreadable: the files say everything that is needed.
-    """
-    path = folder / METADATA_FILE
-    try:
-        if path.stat().st_size > limits.yaml or not path.is_file():
-            return None
-        text = path.read_text(encoding='utf-8')
-    except (OSError, UnicodeDecodeError):
-        return None
-    loaded = load_yaml(text, limits)
-    root = loaded.get(METADATA_ROOT) if isinstance(loaded, dict) else None
-    if not isinstance(root, dict):
-        return None
-    names = root.get('relative_file_paths')
-    files = tuple(n for n in names if isinstance(n, str)) if isinstance(names, list) else ()
-    mode = root.get('compression_mode')
-    return Stated(
-        files, _counts(root), _count(root), mode.upper() if isinstance(mode, str) else ''
-    )
-
-
-def _count(entry: Mapping[str, Yaml]) -> int:
-    text = entry.get('message_count')
-    return int(text) if isinstance(text, str) and _INTEGER.fullmatch(text) else -1
-
-
-def _counts(root: Mapping[str, Yaml]) -> dict[str, int]:
-    counts: dict[str, int] = {}
-    topics = root.get('topics_with_message_count')
-    for entry in topics if isinstance(topics, list) else []:
-        about = entry.get('topic_metadata') if isinstance(entry, dict) else None
-        name = about.get('name') if isinstance(about, dict) else None
-        if isinstance(entry, dict) and isinstance(name, str) and _count(entry) >= 0:
-            counts[name] = counts.get(name, 0) + _count(entry)
-    return counts

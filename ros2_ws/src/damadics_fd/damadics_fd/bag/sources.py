@@ -5,8 +5,9 @@
 import re
 from pathlib import Path
 
+from damadics_fd.bag.checking.stated import read_metadata
 from damadics_fd.bag.errors import BagError
-from damadics_fd.bag.rosbag2 import METADATA_FILE, read_metadata
+from damadics_fd.bag.rosbag2 import METADATA_FILE
 
 SUFFIXES = ('.mcap', '.mcap.zstd', '.db3', '.db3.zstd')
 DEEPEST = 64  # folders within folders that are searched

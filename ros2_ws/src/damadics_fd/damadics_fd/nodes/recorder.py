@@ -29,6 +29,7 @@ LOOK_PERIOD = 0.1  # [s] from a change of the graph to a look at it, at most
 LOOK_SHARE = 0.1  # of the time that looks may take while the graph keeps changing
 BLIND_PERIOD = 1.0  # [s] between two looks where the middleware tells of no changes
 MOST_SHOWN = 50  # topics counted one by one in /diagnostics
+BLOCK_TOPIC = 'measurement_block'
 OWN_TOPICS = {  # subscribed before they have a publisher, so that nothing of them is missed
     'measurement': ('damadics_msgs/msg/Measurement', False),
     'fault_state': ('damadics_msgs/msg/FaultState', False),
@@ -37,7 +38,18 @@ OWN_TOPICS = {  # subscribed before they have a publisher, so that nothing of th
     'threshold': ('damadics_msgs/msg/Float64Stamped', False),
     'fault_flag': ('damadics_msgs/msg/FaultFlag', True),
     'fault_event': ('damadics_msgs/msg/FaultEvent', True),
+    BLOCK_TOPIC: ('damadics_msgs/msg/MeasurementBlock', False),
 }
+
+
+def layout_topic(block_topic: str) -> str:
+    """
+    Return the topic that says which valves the blocks of a topic name.
+
+    >>> layout_topic('/north/measurement_block')
+    '/north/fleet/layout'
+    """
+    return block_topic.removesuffix(BLOCK_TOPIC) + 'fleet/layout'
 
 
 class Recorded(NamedTuple):
@@ -87,6 +99,8 @@ class Recorder(Node):
         super().__init__('recorder')
         self._spool = spool
         self._wanted = {self.resolve_topic_name(name) for name in topics}
+        # blocks name their valves by number: without the list of these nobody can read them
+        self._wanted |= {layout_topic(n) for n in self._wanted if n.endswith(f'/{BLOCK_TOPIC}')}
         self._recorded: dict[str, Recorded] = {}
         self._refused: set[str] = set()
         self._now: Callable[[], int] = time.time_ns

@@ -12,7 +12,7 @@ from damadics_fd.bag.checking.inspection import WHOLE, inspect
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.rosbag2 import Topic
 from damadics_fd.bag.writing import blackbox
-from damadics_fd.bag.writing.blackbox import FLAG, BlackBox
+from damadics_fd.bag.writing.blackbox import FLAG, STATUS, BlackBox
 from damadics_fd.bag.writing.latched import MOST_MESSAGES, Kept, Latched
 from damadics_fd.bag.writing.whole_writes import WholeWrites
 
@@ -52,6 +52,33 @@ class Recorded:
     def tell(self, fault: bool, topic=None) -> None:
         at = self.count * TENTH - 1
         self.box.write(topic or self.flags, flag(fault), at, at)
+
+
+def status(layout: int, *faults: bool) -> bytes:
+    message = messages.FleetStatus(layout=layout, valve=range(len(faults)), fault=faults)
+    message.cause = ['friction'] * len(faults)
+    return serialization.serialize_message(message)
+
+
+def test_a_fault_of_any_valve_of_a_fleet_is_written(tmp_path):
+    valve = Recorded(tmp_path / 'box')
+    fleet = valve.box.add_topic('/fleet/status', STATUS, LATCHED)
+
+    def say(layout, *faults) -> list[str]:
+        valve.hear(20)
+        at = valve.count * TENTH - 1
+        valve.box.write(fleet, status(layout, *faults), at, at)
+        valve.hear(10)
+        return sorted(folder.name for folder in (tmp_path / 'box').iterdir())
+
+    assert say(1, False, False) == []
+    assert say(1, False, True) == ['event_000']
+    assert say(1, False, True) == ['event_000'], 'it stands already'
+    assert say(1, True, True) == ['event_000', 'event_001'], 'the fault of another valve'
+    assert say(1, False, False) == ['event_000', 'event_001']
+    assert say(2) == ['event_000', 'event_001']
+    valve.box.close()
+    assert inspect(tmp_path / 'box' / 'event_001').code == WHOLE
 
 
 def test_a_bag_holds_what_was_before_and_after_each_fault(tmp_path):

@@ -20,7 +20,13 @@ from .bag_support import needs_messages
 rclpy = pytest.importorskip('rclpy')
 pytest.importorskip('damadics_msgs.msg')
 from damadics_fd.ros.loss_count import Sequence  # noqa: E402
-from damadics_msgs.msg import FaultFlag, Float64Stamped, Measurement  # noqa: E402
+from damadics_msgs.msg import (  # noqa: E402
+    FaultFlag,
+    FleetLayout,
+    Float64Stamped,
+    Measurement,
+    MeasurementBlock,
+)
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
 
@@ -120,6 +126,32 @@ def test_every_message_is_in_the_bag_when_a_signal_ends_it(graph, tmp_path, numb
     metadata = (tmp_path / 'bag' / 'metadata.yaml').read_text()
     assert 'durability: transient_local' in metadata
     assert '/estimate' not in metadata  # nobody published it
+
+
+def test_blocks_are_recorded_with_the_list_of_their_valves(graph, tmp_path):
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    layouts = graph.node.create_publisher(FleetLayout, 'fleet/layout', latched)
+    blocks = graph.node.create_publisher(MeasurementBlock, 'measurement_block', 100)
+    names = ['/lv1', '/lv2']
+    layouts.publish(FleetLayout(version=3, valve=names, actuator=names, area=['', '']))
+    topics = ['measurement', 'residual', 'measurement_block']  # and not fleet/layout
+    process = graph.record(*topics, '--out', tmp_path / 'bag')
+    deadline = time.monotonic() + 30
+    while not (blocks.get_subscription_count() and layouts.get_subscription_count()):
+        assert time.monotonic() < deadline, 'the recorder does not subscribe'
+        time.sleep(0.02)
+    for n in range(50):
+        message = MeasurementBlock(layout=3, valve=[0, 1], stamp=[n, n])
+        message.cv, message.x1 = [0.25, 0.75], [float(n), -float(n)]
+        blocks.publish(message)
+    assert blocks.wait_for_all_acked()
+    process.send_signal(signal.SIGINT)
+    out, error = process.communicate(timeout=20)
+    assert process.returncode == 0, error
+    assert inspect(tmp_path / 'bag').code == WHOLE
+    found = read_columns(tmp_path / 'bag', '/measurement_block', valve='/lv2')
+    assert found['x1'].tolist() == [-float(n) for n in range(50)]
+    assert set(found['cv']) == {0.75} and np.isnan(found['ps']).all()
 
 
 def test_messages_lost_on_the_way_are_counted(graph, tmp_path):

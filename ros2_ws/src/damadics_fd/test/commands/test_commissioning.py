@@ -2,17 +2,22 @@
 # SPDX-License-Identifier: Apache-2.0
 """Commissioning: settings for another valve, refusal of wrong units and directions (IN-7)."""
 
+import re
+
 import numpy as np
 import pytest
 import yaml
+from damadics_fd.bag import BagWriter
 from damadics_fd.commands.commission.command import main
 from damadics_fd.commands.commission.errors import CommissioningError
 from damadics_fd.commands.commission.limit import _gumbel, _level
 from damadics_fd.commands.commission.monitor import identify
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.settings.identified import FaultFree
+from damadics_fd.store.fleet_file import read_fleet
 from damadics_fd.store.references import load_reference
 
+from ..bag.block_support import write_blocks
 from ..core.synthetic import KL, valve
 
 SHEET = Settings.for_mode('monitor', signature=False, own_alarm=False)
@@ -217,3 +222,45 @@ def test_options_that_do_not_fit_are_refused(tmp_path, capsys):
             main(words)
         assert stop.value.code == 2
         assert reason in capsys.readouterr().err
+
+
+@pytest.fixture
+def plant_bags(tmp_path, recording):
+    """Two good valves in blocks, one that never moves with a topic of its own."""
+    pytest.importorskip('damadics_msgs.msg')
+    other = valve(400.0, stiffness=1.1, friction=0.03, noise=2e-4)
+    still = {name: np.full(4000, column[0]) for name, column in recording.items()}
+    still['stamp'] = recording['stamp'][:4000]
+    write_blocks(tmp_path / 'bags' / 'blocks.mcap', {'/u1/lv1': recording, '/u1/lv2': other})
+    with BagWriter(tmp_path / 'bags' / 'single.mcap') as bag:
+        bag.add_topic('/lv3/measurement', 'damadics_msgs/msg/Measurement')
+        stamp = still.pop('stamp')
+        bag.write_columns(stamp, {'/lv3/measurement': still}, 'LV-103')
+    return tmp_path / 'bags'
+
+
+def test_a_folder_of_many_valves_gives_a_file_for_each_and_their_list(
+    plant_bags, tmp_path, recording, proposal, capsys
+):
+    words = ['--out', str(tmp_path / 'valves'), '--reference', str(tmp_path / 'references')]
+    assert main([str(plant_bags), *words]) == 1
+    said = capsys.readouterr().out
+    assert re.search(r'u1/lv1 \(U1/LV1\): (ok|limited)', said)
+    assert 'lv3 (LV-103): failed: ' in said
+    fleet = read_fleet(tmp_path / 'valves' / 'fleet.yaml')
+    assert [one.name for one in fleet] == ['u1/lv1', 'u1/lv2']
+    found = yaml.safe_load(fleet[0].parameters.read_text())['/**']['ros__parameters']
+    assert found['actuator'] == 'U1/LV1'
+    assert found['stiffness'] == pytest.approx(proposal.settings.stiffness, rel=1e-12)
+    assert len(list((tmp_path / 'references').iterdir())) == 2
+
+
+def test_many_valves_are_not_taken_for_one(plant_bags, tmp_path, capsys):
+    assert main([str(plant_bags), '--out', str(tmp_path / 'a.yaml')]) == 1
+    said = capsys.readouterr().err
+    assert 'of 3 valves (u1/lv1, u1/lv2, lv3)' in said and '--topic' in said
+    assert main([str(plant_bags), '--out', str(tmp_path / 'a'), '--actuator', 'LV-1']) == 1
+    assert 'leave out --actuator' in capsys.readouterr().err
+    words = ['--topic', '/u1/lv2', '--until', '0.5']
+    assert main([str(plant_bags / 'blocks.mcap'), *words]) == 1
+    assert 'valves' not in capsys.readouterr().err

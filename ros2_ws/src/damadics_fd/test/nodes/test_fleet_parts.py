@@ -19,7 +19,7 @@ from damadics_fd.nodes.fleet.members import Member, Members, members_of
 from damadics_fd.ros.raw import sample_of
 from damadics_fd.store.alarms import AlarmStore
 from damadics_fd.store.fleet_file import FleetError, Valve
-from damadics_msgs.msg import FaultFlag, Measurement, MeasurementBlock
+from damadics_msgs.msg import FaultFlag, FleetLayout, Measurement, MeasurementBlock
 from damadics_plant import simulate
 from rclpy.serialization import serialize_message
 
@@ -70,6 +70,23 @@ def test_rows_of_unknown_valves_and_impossible_stamps_are_refused_alone():
     counts.note(refused, 'gateway')
     assert counts.by_valve.tolist() == [0, 1]
     assert counts.by_sender == {'gateway': 2}
+
+
+def test_a_gateway_numbers_the_valves_as_it_likes():
+    others = blocks.OtherLayouts(['/a', '/b'])
+    others.learn(FleetLayout(version=3, valve=['/elsewhere', 'b', '/a']))
+    message = block([0, 1, 2, 7, 1], [5, 5, 5, 5, -1], layout=3, cv=[0.0, 0.1, 0.2, 0.3, 0.4])
+    rows, refused = blocks.check(message, VERSION, 2, others)
+    assert rows.valve.tolist() == [1, 0], 'the valve of another fleet is none of ours'
+    assert rows.signals['cv'].tolist() == [0.1, 0.2]
+    assert [(one.reason, one.rows.tolist()) for one in refused] == [
+        (blocks.UNKNOWN, []),
+        (blocks.STAMP, [1]),
+    ]
+    for version in range(1000):
+        others.learn(FleetLayout(version=version + 10, valve=['/a']))
+    assert others.numbers(3) is None, 'strangers fill no memory'
+    assert others.numbers(1009).tolist() == [0]
 
 
 def test_no_block_however_odd_brings_the_members_down():

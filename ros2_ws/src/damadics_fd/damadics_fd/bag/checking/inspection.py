@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 
 from damadics_fd.bag.batch import Batch
 from damadics_fd.bag.cdr.decoder import Decoder
+from damadics_fd.bag.checking.stated import read_metadata
 from damadics_fd.bag.checking.timing import Timing
 from damadics_fd.bag.errors import BagError, printable
 from damadics_fd.bag.limits import Limits
 from damadics_fd.bag.messages import MessageFile
 from damadics_fd.bag.opening import open_file
-from damadics_fd.bag.rosbag2 import METADATA_FILE, read_metadata
+from damadics_fd.bag.rosbag2 import METADATA_FILE
 from damadics_fd.bag.sources import bag_files, missing_files
 
 WHOLE, UNUSABLE, LOSSY = 0, 1, 3  # exit codes, as those of `mcap recover`

@@ -10,6 +10,7 @@ from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.mapping import SIGNALS, TIMES, Scale, Source, unit_scale, units_of
 
 SECOND = 1e9  # [ns]
+NANOSECONDS = Scale(1 / SECOND)  # of `stamp`, to seconds
 KPA, PERCENT, TPH = Scale(1e3), Scale(1e-2), Scale(1 / 3.6)
 M3H = Scale(1 / 3.6)  # as if the medium were water
 OWN = (*SIGNALS, 'fault', 'strength')
@@ -166,7 +167,7 @@ def _time_of(names: Sequence[Header]) -> tuple[tuple[int, ...], Scale | None]:
     if date is not None:
         return ((date, daytime) if daytime is not None else (date,)), None
     if 'stamp' in folded:
-        return (folded.index('stamp'),), Scale(1 / SECOND)
+        return (folded.index('stamp'),), NANOSECONDS
     for name in TIME_NAMES:
         if name in folded:
             place = folded.index(name)
@@ -204,7 +205,7 @@ def assign(
         if target in TIMES:
             time, scale = (column,), given
             if target == 'stamp':
-                scale = (given or Scale()).then(Scale(1 / SECOND))
+                scale = (given or Scale()).then(NANOSECONDS)
         else:  # the user's factor counts from the raw numbers
             own[target] = Use(column, given or names[column].scale(target))
     if {'cv', 'x1'} <= own.keys():

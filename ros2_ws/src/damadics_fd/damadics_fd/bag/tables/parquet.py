@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recordings as Parquet, with the column names of text tables."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,15 +12,19 @@ from numpy.typing import NDArray
 from damadics_fd.bag.arrays import Columns
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.mapping import Scale, Source
-from damadics_fd.bag.tables.headers import SECOND, Assignment, assign, headers
+from damadics_fd.bag.tables.headers import NANOSECONDS, SECOND, Assignment, assign, headers
 from damadics_fd.bag.tables.table import ROWS, Table, Told, lacking
 from damadics_fd.bag.tables.times import Dates, seconds_of
 
 try:
     import pyarrow
-    from pyarrow import parquet
+    from pyarrow import compute, parquet
 except ImportError:
     pyarrow = None  # told when a file is to be read
+
+
+VALVE = 'valve'  # column that says whose row it is, where one file holds many valves
+MOST_VALVES = 100_000  # of one file
 
 
 @dataclass(frozen=True)
@@ -29,9 +33,16 @@ class ParquetTable(Table):
     One actuator in a Parquet file.
 
     :param names: all columns of the file.
+    :param of_valve: the one whose rows these are, where the file has a column `valve`.
     """
 
     names: tuple[str, ...] = ()
+    of_valve: str | None = None
+
+    @property
+    def valve(self) -> str | None:
+        """Whose rows these are, where the file has a column that says so."""
+        return self.of_valve
 
     def chunks(self, on_problem: Told) -> Iterator[Columns]:
         """
@@ -40,20 +51,40 @@ class ParquetTable(Table):
         :param on_problem: told of rows without a time, which are left out.
         :raises BagError: where the file is damaged or a column holds no numbers.
         """
+        for columns in self._pieces(None if self.valve is None else [self.valve], on_problem):
+            columns.pop(VALVE, None)
+            yield columns
+
+    def rows(self, valves: Sequence[str], on_problem: Told) -> Iterator[Columns]:
+        """
+        Yield the rows of several valves, as `BlockReader.rows` does.
+
+        :param valves: their names; rows of others are left out.
+        :param on_problem: as for `chunks`.
+        :return: `valve` (index into `valves`), `stamp` and the signals.
+        :raises BagError: as `chunks`.
+        """
+        yield from self._pieces(valves, on_problem)
+
+    def _pieces(self, valves: Sequence[str] | None, on_problem: Told) -> Iterator[Columns]:
         signals = self.assignment.signals
         clock = self.names[self.assignment.time[0]]
         wanted = {clock, *(self.names[use.column] for use in signals.values())}
+        wanted |= {VALVE} if valves is not None else set()
         row = 0
         try:
             with parquet.ParquetFile(self.path) as file:
                 for batch in file.iter_batches(ROWS, columns=sorted(wanted)):
                     row += len(batch)
-                    columns = {
-                        name: use.scale(_numbers(batch.column(self.names[use.column])))
-                        for name, use in signals.items()
-                    }
+                    columns: Columns = {}
+                    if valves is not None:
+                        batch, columns[VALVE] = _of_valves(batch, valves)
+                        if not len(batch):
+                            continue
+                    for name, use in signals.items():
+                        columns[name] = use.scale(_numbers(batch.column(self.names[use.column])))
                     time = batch.column(clock)
-                    exact = _exact(time)
+                    exact = _exact(time, self.assignment.scale == NANOSECONDS)
                     if exact is not None:
                         yield columns | {'stamp': exact}
                         continue
@@ -81,8 +112,24 @@ class ParquetTable(Table):
         return scale(numbers) * SECOND
 
 
-def _exact(time: 'pyarrow.Array') -> NDArray[np.int64] | None:
-    """Return dates [ns] without a detour through floating point, None where they are none."""
+def _of_valves(
+    batch: 'pyarrow.RecordBatch', valves: Sequence[str]
+) -> tuple['pyarrow.RecordBatch', NDArray[np.int64]]:
+    """Return the rows of some valves, and which of them each is of."""
+    names = batch.column(VALVE)
+    if pyarrow.types.is_dictionary(names.type):
+        names = names.dictionary_decode()
+    names = names.cast(pyarrow.string())
+    found = compute.index_in(names, pyarrow.array(valves, pyarrow.string()))
+    number = np.array(compute.fill_null(found, -1).to_numpy(zero_copy_only=False), np.int64)
+    own = number >= 0
+    return (batch if own.all() else batch.filter(pyarrow.array(own))), number[own]
+
+
+def _exact(time: 'pyarrow.Array', is_stamp: bool) -> NDArray[np.int64] | None:
+    """Return stamps [ns] without a detour through floating point, None where they are none."""
+    if is_stamp and pyarrow.types.is_integer(time.type) and not time.null_count:
+        return np.array(time.cast(pyarrow.int64()).to_numpy(zero_copy_only=False), np.int64)
     if not pyarrow.types.is_timestamp(time.type) or time.null_count:
         return None
     whole = time.cast(pyarrow.timestamp('ns', time.type.tz)).cast(pyarrow.int64())
@@ -111,11 +158,34 @@ def read_parquet(path: Path, actuator: int | None, chosen: Mapping[str, Source])
         raise BagError(error.reason, path) from error
     dates = [i for i, field in enumerate(schema) if pyarrow.types.is_timestamp(field.type)]
     tables: list[Table] = []
+    valves: list[str | None] = [*_valves(path, schema)] if VALVE in names else [None]
     for name, assignment in found.items():
         time = assignment.time[:1] or tuple(dates[:1])
         if time:
             placed = Assignment(assignment.signals, time, assignment.scale)
-            tables.append(ParquetTable(path, name, placed, names))
+            tables += [ParquetTable(path, v or name, placed, names, v) for v in valves]
     if not tables:
         raise lacking(path, list(names))
     return tables
+
+
+def _valves(path: Path, schema: 'pyarrow.Schema') -> list[str]:
+    """List the valves that the rows of a file name, in the order of their first rows."""
+    kind = schema.field(VALVE).type
+    kind = kind.value_type if pyarrow.types.is_dictionary(kind) else kind
+    if not (pyarrow.types.is_string(kind) or pyarrow.types.is_large_string(kind)):
+        raise BagError(f'the column {VALVE} holds no names: {kind}', path)
+    found: dict[str, None] = {}
+    unnamed = 0
+    try:
+        with parquet.ParquetFile(path) as file:
+            for batch in file.iter_batches(ROWS, columns=[VALVE]):
+                unnamed += batch.column(VALVE).null_count
+                found |= dict.fromkeys(n for n in batch.column(VALVE).unique().to_pylist() if n)
+                if len(found) > MOST_VALVES:
+                    raise BagError(f'names more than {MOST_VALVES} valves', path)
+    except (pyarrow.ArrowException, OSError, ValueError) as error:
+        raise BagError(f'cannot be read: {error}', path) from error
+    if unnamed or not found:
+        raise BagError(f'{unnamed} rows name no valve: fill the column {VALVE}', path)
+    return list(found)

@@ -3,7 +3,7 @@
 """Recordings as text: CSV of spreadsheets, pandas and historians, the daily files of Lublin."""
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from itertools import islice
@@ -41,6 +41,22 @@ class Table:
     path: Path
     name: str
     assignment: Assignment
+
+    @property
+    def valve(self) -> str | None:
+        """Whose rows these are, where the file has a column that says so."""
+        return None
+
+    def rows(self, valves: Sequence[str], on_problem: Told) -> Iterator[Columns]:
+        """
+        Yield the rows of several valves of the file.
+
+        :param valves: names as `valve` has them.
+        :param on_problem: as for `chunks`.
+        :return: `valve` (index into `valves`), `stamp` and the signals.
+        :raises BagError: as `chunks`.
+        """
+        raise NotImplementedError
 
     def chunks(self, on_problem: Told) -> Iterator[Columns]:
         """

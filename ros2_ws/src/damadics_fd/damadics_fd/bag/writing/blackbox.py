@@ -6,16 +6,21 @@ import shutil
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 
-from damadics_fd.bag.cdr.definition import parse_definition, schema_text
+import numpy as np
+from numpy.typing import NDArray
+
+from damadics_fd.bag.cdr.definition import Definition, parse_definition, schema_text
 from damadics_fd.bag.cdr.layout import layout_of
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.rosbag2 import QosProfile, Topic
 from damadics_fd.bag.writing.bag_writer import NANO, BagWriter
 from damadics_fd.bag.writing.latched import Kept, Latched
 
-FLAG = 'damadics_msgs/msg/FaultFlag'
+FLAG, STATUS = 'damadics_msgs/msg/FaultFlag', 'damadics_msgs/msg/FleetStatus'
+FAULTY = (FLAG, STATUS)  # types that tell of faults
 MOST_BYTES = 1 << 29  # held in memory, whatever the seconds
 MOST_EVENTS = 8  # written at the same time
 
@@ -45,7 +50,8 @@ class BlackBox:
     """
     Hold the last messages of all topics; write a bag from before until after each fault.
 
-    It stands where a `BagWriter` stands. A fault is the rise of `fault` in any `FaultFlag`. Its
+    It stands where a `BagWriter` stands. A fault is the rise of `fault` in any `FaultFlag`, or of
+    any valve in a `FleetStatus`. Its
     messages wait in memory while the disk is full, and an `OSError` is retried by `flush`.
     Latched messages from before stand at the head of each bag.
 
@@ -63,7 +69,7 @@ class BlackBox:
         self._bytes = 0
         self._latched = Latched()
         self._topics: dict[str, Topic] = {}
-        self._faults: dict[str, bool] = {}
+        self._faults: dict[str, frozenset[int]] = {}  # valves, by the topic that tells of them
         self._active: list[Event] = []
         self._written: dict[str, int] = {}
         self._size = 0
@@ -94,17 +100,16 @@ class BlackBox:
             if not event.over:
                 event.waiting.append(message)
                 event.over = log_time >= event.end
-        if topic.type == FLAG and self._rises(topic, data):
+        if topic.type in FAULTY and self._rises(topic, data):
             self._begin(topic, log_time)
         self._drain()
 
     def _rises(self, topic: Topic, data: bytes) -> bool:
-        definition = parse_definition(FLAG, schema_text(FLAG))
-        layout = layout_of(definition, FLAG, data)
-        fault = bool(data[next(p.offset for p in layout.places if p.name == 'fault')])
-        before = self._faults.get(topic.name, False)
-        self._faults[topic.name] = fault
-        return fault and not before
+        """Tell whether a valve has a fault that had none before."""
+        faulty = _faulty(topic.type, data)
+        before = self._faults.get(topic.name, frozenset())
+        self._faults[topic.name] = faulty
+        return not faulty <= before
 
     def _begin(self, flag: Topic, log_time: int) -> None:
         """Note a fault before anything is tried that may fail."""
@@ -198,6 +203,34 @@ class BlackBox:
         self._drain()
         for event in list(self._active):
             self._finish(event)
+
+
+def _faulty(kind: str, data: bytes) -> frozenset[int]:
+    """Return the valves that a message says have a fault: 0 of one valve, numbers of a fleet."""
+    layout = layout_of(_up_to_fault(kind), kind, data)
+    fields = {place.name: place for place in layout.places}
+
+    def column(name: str) -> NDArray[np.int64]:
+        place = fields[name]
+        number = np.dtype(layout.order + place.dtype)
+        count = 1 if place.repeat is None else place.repeat
+        return np.frombuffer(data, number, count, place.offset).astype(np.int64)
+
+    fault = column('fault') != 0
+    if kind == FLAG:
+        return frozenset(np.flatnonzero(fault).tolist())
+    valve = column('valve')
+    known = valve[: len(fault)][fault[: len(valve)]]
+    return frozenset((known + (int(column('layout')[0]) << 32)).tolist())  # a new list is news
+
+
+@cache
+def _up_to_fault(kind: str) -> Definition:
+    """Return the definition without what follows the faults, of which a fleet has much."""
+    definition = dict(parse_definition(kind, schema_text(kind)))
+    names = [member.name for member in definition[kind]]
+    definition[kind] = definition[kind][: names.index('fault') + 1]
+    return definition
 
 
 def _declared(bag: BagWriter, topic: Topic) -> Topic:

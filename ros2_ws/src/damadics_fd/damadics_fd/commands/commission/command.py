@@ -4,21 +4,28 @@
 
 import argparse
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from damadics_fd.bag.errors import BagError
-from damadics_fd.bag.recording import Recording, find_recordings, parse_maps
+from damadics_fd.bag.recording import find_recordings, parse_maps
 from damadics_fd.commands.commission.control_room import identify as identify_scada
 from damadics_fd.commands.commission.errors import CommissioningError
 from damadics_fd.commands.commission.monitor import identify
 from damadics_fd.commands.commission.plot import draw
 from damadics_fd.commands.commission.twin import model, write_twin
 from damadics_fd.commands.commission.valve_file import parameter_file
+from damadics_fd.commands.many_valves import (
+    by_valve,
+    commission_all,
+    need_a_folder,
+    read_all,
+    warn,
+)
 from damadics_fd.commands.options import add_settings, add_sources, settings_in
-from damadics_fd.core.record import Floats, Ints
 from damadics_fd.core.settings import Settings, SettingsError
 from damadics_fd.core.settings.identified import REFUSED, FaultFree, Identified
 from damadics_fd.ros.arguments import command_parser
@@ -29,8 +36,10 @@ EXAMPLES = """examples:
   ros2 run damadics_fd commission monday.csv tuesday.csv --map x1=POS*0.01 --set mass=3.5 \\
       --set area=0.045 --days 90 --reference references/LV-101 --actuator LV-101 --out lv101.yaml
   ros2 run damadics_fd commission before_the_fault.mcap --until 70 --out lv101.yaml
-  ros2 run damadics_fd commission day1.csv day2.csv --mode scada --out lv101.yaml"""
+  ros2 run damadics_fd commission day1.csv day2.csv --mode scada --out lv101.yaml
+  ros2 run damadics_fd commission plant_bags/ --out valves --reference references   many valves"""
 FAILED, NOT_USABLE = 1, 3
+FAILED_VERDICT = 'failed'
 
 
 def arguments(args: list[str] | None = None) -> argparse.Namespace:
@@ -51,7 +60,12 @@ def arguments(args: list[str] | None = None) -> argparse.Namespace:
         'recordings', nargs='+', type=Path, metavar='RECORDING', help='MCAP, bag folder or table'
     )
     parser.add_argument('--mode', choices=('monitor', 'scada'), default='monitor')
-    parser.add_argument('--out', type=Path, metavar='FILE', help='write the parameter file (YAML)')
+    parser.add_argument(
+        '--out',
+        type=Path,
+        metavar='FILE',
+        help='write the parameter file (YAML); of many valves: a folder, for these and fleet.yaml',
+    )
     parser.add_argument('--plot', type=Path, metavar='FILE', help='draw the sanity plot (PNG)')
     parser.add_argument(
         '--until',
@@ -63,7 +77,8 @@ def arguments(args: list[str] | None = None) -> argparse.Namespace:
         '--reference',
         type=Path,
         metavar='PATH',
-        help='write what was learned as the reference, PATH.a.json or .b.json',
+        help='write what was learned as the reference, PATH.a.json or .b.json; of many valves: '
+        'a folder',
     )
     parser.add_argument('--actuator', default='', help='tag of the actuator, kept in the files')
     parser.add_argument(
@@ -85,36 +100,31 @@ def arguments(args: list[str] | None = None) -> argparse.Namespace:
         parser.error('--days must be positive')
     if options.until is not None and not options.until > 0.0:
         parser.error('--until must be positive')
-    if options.reference and not options.actuator:
+    folder = options.out is not None and not options.out.suffix
+    if options.reference and not options.actuator and not folder:
         parser.error('--reference belongs to an actuator: name it with --actuator')
     if options.mode == 'scada' and (options.plot or options.twin):
         parser.error('--plot and --twin are of mode monitor')
     return options
 
 
-def read(recording: Recording, until: float | None = None) -> FaultFree:
+def until(recordings: list[FaultFree], seconds: float | None) -> list[FaultFree]:
     """
-    Return the columns of a recording; damaged places are told and left out.
+    Return the beginnings of recordings.
 
-    :param recording: what to read.
-    :param until: [s] from its beginning, after which nothing is used; None for all.
-    :return: the columns.
-    :raises CommissioningError: where nothing is left.
+    :param recordings: whole.
+    :param seconds: [s] from the beginning of each, after which nothing is used; None for all.
+    :return: what is to be used.
     """
-    chunks = list(recording.chunks(lambda text: print(f'commission: {text}', file=sys.stderr)))
-    names = set.intersection(*(set(chunk) for chunk in chunks)) if chunks else set()
-    columns: dict[str, Floats | Ints] = {
-        name: np.concatenate([chunk[name] for chunk in chunks]) for name in names
-    }
-    if 'stamp' not in columns and 'log_time' in columns:
-        columns['stamp'] = columns['log_time']
-    if 'stamp' not in columns or not len(columns['stamp']):
-        raise CommissioningError(f'{recording.name} holds no measurement')
-    if until is not None:
-        stamp = np.asarray(columns['stamp'], np.int64)
-        kept = stamp - stamp[0] <= until * 1e9
-        columns = {name: column[kept] for name, column in columns.items()}
-    return FaultFree(recording.name, columns)
+    if seconds is None:
+        return recordings
+    found = []
+    for one in recordings:
+        stamp = np.asarray(one.columns['stamp'], np.int64)
+        kept = stamp - stamp[0] <= seconds * 1e9
+        columns = {name: column[kept] for name, column in one.columns.items()}
+        found.append(FaultFree(one.name, columns))
+    return found
 
 
 def data_sheet(texts: list[str], mode: str = 'monitor') -> tuple[Settings, set[str]]:
@@ -143,31 +153,71 @@ def main(args: list[str] | None = None) -> int:
         found = find_recordings(
             options.recordings, topic=options.topic, maps=parse_maps(options.map)
         )
-        recordings = [read(recording, options.until) for recording in found]
-        identified = _identify(recordings, sheet, given, options)
+        groups = by_valve(found, options.actuator)
+        source = ', '.join(str(path) for path in options.recordings)
+        if len(groups) > 1:
+            need_a_folder(groups, options)
+
+            def one_of_many(
+                name: str, tag: str, recordings: list[FaultFree], file: Path
+            ) -> Identified:
+                reference = options.reference / file.stem if options.reference else None
+                return _commission(recordings, sheet, given, options, source, tag, file, reference)
+
+            return _code(commission_all(groups, options, one_of_many, warn))
+        if options.reference and not options.actuator:
+            raise CommissioningError('--reference belongs to an actuator: name it with --actuator')
+        (recordings,) = read_all(groups, warn).values()
+        if not recordings:
+            raise CommissioningError(f'{source} holds no measurement')
+        identified = _commission(
+            recordings, sheet, given, options, source, options.actuator, options.out,
+            options.reference,
+        )  # fmt: skip
         for line in identified.report:
             print(line)
-        source = ', '.join(str(path) for path in options.recordings)
         if options.out:
-            text = parameter_file(
-                identified,
-                options.mode,
-                source,
-                options.actuator,
-                str(options.reference or ''),
-            )
-            options.out.write_text(text, encoding='utf-8')
             print(f'written: {options.out}')
-        if options.reference and identified.verdict != REFUSED:
-            _write_reference(identified, recordings, options, source)
     except (BagError, CommissioningError, SettingsError, KeyError, OSError, ValueError) as error:
         print(f'commission: {error}', file=sys.stderr)
         return FAILED
-    return NOT_USABLE if identified.verdict == REFUSED else 0
+    return _code([identified.verdict])
+
+
+def _code(verdicts: Sequence[str]) -> int:
+    """Return the exit code: that of the worst valve."""
+    if FAILED_VERDICT in verdicts:
+        return FAILED
+    return NOT_USABLE if REFUSED in verdicts else 0
+
+
+def _commission(
+    recordings: list[FaultFree],
+    sheet: Settings,
+    given: set[str],
+    options: argparse.Namespace,
+    source: str,
+    tag: str,
+    out: Path | None,
+    reference: Path | None,
+) -> Identified:
+    """Identify one valve, and write its files."""
+    recordings = until(recordings, options.until)
+    identified = _identify(recordings, sheet, given, options, tag)
+    if out:
+        text = parameter_file(identified, options.mode, source, tag, str(reference or ''))
+        out.write_text(text, encoding='utf-8')
+    if reference and identified.verdict != REFUSED:
+        _write_reference(identified, recordings, options.mode, tag, reference, source)
+    return identified
 
 
 def _identify(
-    recordings: list[FaultFree], sheet: Settings, given: set[str], options: argparse.Namespace
+    recordings: list[FaultFree],
+    sheet: Settings,
+    given: set[str],
+    options: argparse.Namespace,
+    tag: str,
 ) -> Identified:
     if options.mode == 'scada':
         return identify_scada(recordings, sheet, given)
@@ -175,10 +225,10 @@ def _identify(
     if options.plot:
         draw(proposal, options.plot)
     if options.twin:
-        write_twin(proposal, options.twin, options.actuator)
+        write_twin(proposal, options.twin, tag)
     found = proposal.identified(Settings.for_mode('monitor'))
     try:
-        return replace(found, twin=model(proposal, options.actuator))
+        return replace(found, twin=model(proposal, tag))
     except CommissioningError as error:  # the simulated actuator cannot be every valve
         return replace(found, report=(*found.report, f'note: {error}'))
 
@@ -186,17 +236,19 @@ def _identify(
 def _write_reference(
     identified: Identified,
     recordings: list[FaultFree],
-    options: argparse.Namespace,
+    mode: str,
+    tag: str,
+    reference: Path,
     source: str,
 ) -> None:
     if not identified.learned:
         print('commission: nothing was learned: no reference is written', file=sys.stderr)
         return
-    settings = Settings.from_mapping({'mode': options.mode, **identified.settings})
+    settings = Settings.from_mapping({'mode': mode, **identified.settings})
     written = save_reference(
-        options.reference,
+        reference,
         Reference(
-            options.actuator,
+            tag,
             dict(identified.learned),
             settings.to_dict(),
             source=source,
@@ -205,7 +257,7 @@ def _write_reference(
             commissioning=identified.judgement(),
         ),
     )
-    print(f'reference of {options.actuator}: {written}')
+    print(f'reference of {tag}: {written}')
 
 
 if __name__ == '__main__':

@@ -5,11 +5,13 @@
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 
 from damadics_fd.bag.arrays import Columns
+from damadics_fd.bag.blocks.together import read_together, source_of
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.recording import Recording
 from damadics_fd.causes import load_causes
@@ -56,7 +58,13 @@ class Plan:
     def monitor(self) -> Chain:
         """Return the monitor in its first state."""
         settings = Settings.for_mode(self.mode, **self.settings)
-        return monitor_for(settings, load_causes().classes).starting_from(self.learned)
+        return monitor_for(settings, _classes()).starting_from(self.learned)
+
+
+@cache
+def _classes() -> Sequence[int]:
+    """Return the class of each cause; read once, not for each valve of a thousand."""
+    return load_causes().classes
 
 
 def replay(
@@ -74,72 +82,155 @@ def replay(
     :param stem: file name without suffix for pictures and bags.
     :return: what became of it; where it cannot be read, `error` says why.
     """
-    outcome = Outcome(recording.name, plan.mode)
+    return replay_together([recording], plan, [stem or recording.path.stem], progress)[0]
+
+
+def replay_together(
+    recordings: Sequence[Recording],
+    plan: Plan,
+    stems: Sequence[str],
+    progress: Callable[[int], None] = lambda count: None,
+) -> list[Outcome]:
+    """
+    Replay one recording, or several of one file in one pass.
+
+    :param recordings: one, or such as `source_of` tells to lie together.
+    :param plan: how.
+    :param stems: file name of each without suffix, for pictures and bags.
+    :param progress: told the number of samples of each piece.
+    :return: what became of each; where it cannot be read, `error` says why.
+    """
+    outcomes = [Outcome(one.name, plan.mode) for one in recordings]
+    told: list[str] = []  # of the file, whichever valve it concerns
+    players: dict[int, Player] = {}
     try:
-        _replay(recording, plan, outcome, progress, stem or Path(recording.path).stem)
+        pieces: Iterator[tuple[int, Columns]]
+        if source_of(recordings[0]):
+            pieces = read_together(recordings, told.append)
+        else:
+            pieces = ((0, piece) for piece in joined(recordings[0].chunks(told.append)))
+        began = time.perf_counter()
+        for number, columns in pieces:
+            outcome = outcomes[number]
+            if not outcome.error:
+                try:
+                    if number not in players:
+                        players[number] = Player(recordings[number], plan, stems[number], outcome)
+                    players[number].take(columns)
+                except (BagError, OSError, RuntimeError) as error:
+                    outcome.error = str(error)
+            progress(len(columns['stamp']))
+            now = time.perf_counter()
+            outcome.spent += now - began
+            began = now
     except (BagError, OSError, RuntimeError) as error:
-        outcome.error = str(error)
-    return outcome
-
-
-def _replay(
-    recording: Recording, plan: Plan, outcome: Outcome, progress: Callable[[int], None], stem: str
-) -> None:
-    monitor = plan.monitor()
-    zero = first = last = None
-    flags = FlagWriter(plan.bags / f'{stem}_flags.mcap', recording) if plan.bags else None
-    thinner = Thinner() if plan.figures else None
-    forces = ForceMap(monitor.signature) if plan.figures and plan.mode == 'monitor' else None
-    lacking = set(NEEDED[plan.mode])
-    spent = 0.0
-    pieces = joined(recording.chunks(outcome.problems.append))
-    try:
-        while True:
-            began = time.perf_counter()
-            columns = next(pieces, None)
-            if columns is None:
-                break
-            stamp = columns['stamp']
-            lacking &= {name for name in lacking if np.isnan(columns.get(name, np.nan)).all()}
-            if (stamp < 0).any():
-                raise BagError('has stamps that have rolled over: see verify', recording.name)
-            if zero is None or first is None:
-                zero, first = origin(int(stamp[0])), int(stamp[0])
-            last = int(stamp[-1])
-            result = monitor.run(columns) if flags or thinner else None
-            events = result.events if result else monitor.events(columns)
-            spent += time.perf_counter() - began
-            collect(outcome.detections, events, zero)
-            outcome.samples += len(stamp)
-            if result and flags:
-                flags.write(result)
-            if result and thinner:
-                thinner.add(columns, result)
-            if result and forces:
-                forces.add(result.estimates[result.accepted])
-            progress(len(stamp))
+        for outcome in outcomes:
+            outcome.error = outcome.error or str(error)
     finally:
-        if flags:
-            flags.close()
-    if first is None or last is None:
+        for player in players.values():
+            player.close()
+    for number, outcome in enumerate(outcomes):
+        outcome.problems += told
+        if outcome.error:
+            continue
+        try:
+            if number in players:
+                players[number].finish()
+            else:
+                _without_rows(recordings[number], outcome)
+        except (BagError, OSError, RuntimeError) as error:
+            outcome.error = str(error)
+    return outcomes
+
+
+def _without_rows(recording: Recording, outcome: Outcome) -> None:
+    """Tell of a valve without a sample: others of the same file may well have some."""
+    if not source_of(recording):
         raise BagError('has no measurement: the topic is empty', recording.name)
-    outcome.duration_s = (last - first) / SECOND
-    outcome.samples_per_s = outcome.samples / spent
-    outcome.lossy = bool(outcome.problems) and not recording.table
-    outcome.refused, outcome.status = monitor.refused, monitor.status
-    rate = outcome.samples / max(outcome.duration_s, 1e-9)
-    if plan.mode == 'scada' and rate > FAST:
-        outcome.status += f'; samples at {rate:.0f} Hz, for which there is --mode monitor'
-    _judge_refused(outcome, lacking)
-    if thinner and plan.figures:
-        _draw(thinner, recording, outcome, plan.figures / f'{stem}.png')
-    if forces and plan.figures and monitor.signature.view().state >= STATE_VERIFY:
-        force_over_position(
-            forces,
-            monitor.signature,
-            plan.figures / f'{stem}_signature.png',
-            Path(recording.name).name.removesuffix('.mcap'),
+    outcome.status = 'no sample in the blocks' if recording.valve else 'no sample'
+    outcome.lossy = bool(outcome.problems)
+
+
+class Player:
+    """
+    Judge one recording piece by piece.
+
+    :param recording: what is replayed.
+    :param plan: how.
+    :param stem: file name without suffix for pictures and bags.
+    :param outcome: what becomes of it.
+    """
+
+    def __init__(self, recording: Recording, plan: Plan, stem: str, outcome: Outcome) -> None:
+        self._recording, self._plan, self._stem = recording, plan, stem
+        self._outcome = outcome
+        self._monitor = plan.monitor()
+        drawn = plan.figures is not None
+        self._flags = (
+            FlagWriter(plan.bags / f'{stem}_flags.mcap', recording) if plan.bags else None
         )
+        self._thinner = Thinner() if drawn else None
+        self._forces = (
+            ForceMap(self._monitor.signature) if drawn and plan.mode == 'monitor' else None
+        )
+        self._lacking = set(NEEDED[plan.mode])
+        self._zero = self._first = self._last = -1
+
+    def take(self, columns: Columns) -> None:
+        """
+        Judge the next rows.
+
+        :param columns: at least one row.
+        :raises BagError: where the recording cannot be judged.
+        """
+        stamp, lacking = columns['stamp'], self._lacking
+        lacking &= {name for name in lacking if np.isnan(columns.get(name, np.nan)).all()}
+        if (stamp < 0).any():
+            raise BagError('has stamps that have rolled over: see verify', self._recording.name)
+        if self._first < 0:
+            self._zero, self._first = origin(int(stamp[0])), int(stamp[0])
+        self._last = int(stamp[-1])
+        result = self._monitor.run(columns) if self._flags or self._thinner else None
+        events = result.events if result else self._monitor.events(columns)
+        collect(self._outcome.detections, events, self._zero)
+        self._outcome.samples += len(stamp)
+        if result and self._flags:
+            self._flags.write(result)
+        if result and self._thinner:
+            self._thinner.add(columns, result)
+        if result and self._forces:
+            self._forces.add(result.estimates[result.accepted])
+
+    def close(self) -> None:
+        """Finish the bag with the flags, whatever has come about."""
+        if self._flags:
+            self._flags.close()
+
+    def finish(self) -> None:
+        """
+        Complete the outcome.
+
+        :raises BagError: where there is no result.
+        """
+        outcome, plan, recording = self._outcome, self._plan, self._recording
+        outcome.duration_s = (self._last - self._first) / SECOND
+        outcome.samples_per_s = outcome.samples / outcome.spent
+        outcome.lossy = bool(outcome.problems) and not recording.table
+        outcome.refused, outcome.status = self._monitor.refused, self._monitor.status
+        rate = outcome.samples / max(outcome.duration_s, 1e-9)
+        if plan.mode == 'scada' and rate > FAST:
+            outcome.status += f'; samples at {rate:.0f} Hz, for which there is --mode monitor'
+        _judge_refused(outcome, self._lacking)
+        if self._thinner and plan.figures:
+            _draw(self._thinner, recording, outcome, plan.figures / f'{self._stem}.png')
+        signature = self._monitor.signature
+        if self._forces and plan.figures and signature.view().state >= STATE_VERIFY:
+            force_over_position(
+                self._forces,
+                signature,
+                plan.figures / f'{self._stem}_signature.png',
+                Path(recording.name).name.removesuffix('.mcap'),
+            )
 
 
 def _judge_refused(outcome: Outcome, lacking: set[str]) -> None:

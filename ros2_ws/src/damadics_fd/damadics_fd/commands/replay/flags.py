@@ -42,7 +42,7 @@ class FlagWriter:
     """
 
     def __init__(self, path: Path, recording: Recording):
-        prefix = recording.topic.removesuffix('measurement') if not recording.table else '/'
+        prefix = '/' if recording.table else recording.place
         self._names = {
             name: prefix + name for name in ('estimate', 'residual', 'threshold', 'fault_flag')
         }
@@ -116,6 +116,8 @@ def frame_id(recording: Recording) -> str:
     """
     if recording.table or recording.maps:
         return recording.table.name if recording.table else ''
+    if recording.valve:
+        return recording.tag
     try:
         chunk = next(
             iter_columns(

@@ -45,6 +45,7 @@ class Outcome:
     :param samples: measurements read.
     :param duration_s: from the first to the last stamp [s].
     :param samples_per_s: over reading, decoding, estimator and detector.
+    :param spent: for that [s]; not among the results.
     :param detections: `t` [s] since scenario zero (since the first sample for real data), `stamp`
         [ns] and the evidence of each.
     :param refused: samples that never reached the filters, by reason.
@@ -59,6 +60,7 @@ class Outcome:
     samples: int = 0
     duration_s: float = 0.0
     samples_per_s: float = 0.0
+    spent: float = 0.0
     detections: list[Detection] = field(default_factory=list)
     refused: dict[str, int] = field(default_factory=dict)
     status: str = ''
@@ -78,6 +80,7 @@ class Outcome:
     def content(self) -> dict[str, object]:
         """Return everything, the verdict included."""
         values = asdict(self)
+        del values['spent']
         return {
             'bag': values.pop('bag'),
             'mode': values.pop('mode'),

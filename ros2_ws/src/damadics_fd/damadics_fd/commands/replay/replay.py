@@ -3,23 +3,17 @@
 """The command replay: recordings through estimator and detector."""
 
 import argparse
-import multiprocessing
 import os
 import re
 import sys
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, wait
-from dataclasses import replace
 from itertools import chain, count
-from multiprocessing.sharedctypes import Synchronized
 from pathlib import Path
 
 import yaml
-from tqdm import tqdm
 
 from damadics_fd.bag.checking.inspection import LOSSY
 from damadics_fd.bag.errors import BagError, NoMeasurementError, printable
-from damadics_fd.bag.mcap import loading
 from damadics_fd.bag.recording import Recording, find_recordings, parse_maps
 from damadics_fd.commands.options import (
     add_settings,
@@ -27,7 +21,8 @@ from damadics_fd.commands.options import (
     settings_in,
     with_suggestions,
 )
-from damadics_fd.commands.replay.bags import Plan, replay, warm_up
+from damadics_fd.commands.replay.bags import Plan
+from damadics_fd.commands.replay.many import BESIDE, replay_all
 from damadics_fd.commands.replay.outcome import Outcome
 from damadics_fd.commands.replay.output import (
     check_format,
@@ -52,11 +47,9 @@ EXAMPLES = """examples:
 
 exit code: 0 every recording gave a result, 3 something of one is damaged or missing, 1 one of them
 failed, 2 wrong command line"""
-BESIDE = Path()  # bags with the flags go next to the inputs
 WARNINGS = 3  # shown per recording
 _SUFFIX = re.compile(r'(\.(mcap|db3)(\.zstd)?|\.csv|\.txt|\.tsv|\.parquet|\.pq)$', re.IGNORECASE)
 _UNSAFE = re.compile(r'[^\w. +#()@=-]')
-_counter: 'Synchronized[int]'  # samples done by all workers
 
 
 def arguments(args: list[str] | None = None) -> argparse.Namespace:
@@ -115,6 +108,11 @@ def arguments(args: list[str] | None = None) -> argparse.Namespace:
         help='processes (default: one per core)',
     )
     parser.add_argument(
+        '--scheduler',
+        metavar='ADDRESS',
+        help='Dask scheduler, tcp://host:port: its workers replay, and see the same files',
+    )
+    parser.add_argument(
         '--live', action='store_true', help='publish on the topics, with /clock, instead'
     )
     parser.add_argument(
@@ -130,6 +128,8 @@ def arguments(args: list[str] | None = None) -> argparse.Namespace:
         parser.error(f'--jobs {options.jobs}: give 1 or more')
     if options.live and (options.out or options.figures or options.bag):
         parser.error('--live writes no files: leave out --out, --figures and --bag')
+    if options.live and options.scheduler:
+        parser.error('--live runs here: leave out --scheduler')
     if not options.live and (options.rate is not None or options.inputs_only):
         parser.error('--rate and --inputs-only go with --live')
     if options.rate is not None and not options.rate > 0.0:
@@ -220,19 +220,22 @@ def main(args: list[str] | None = None) -> int:
 
             code = publish(recordings, plan, options.rate or 1.0, options.inputs_only, ros_args)
             return max(code, report_errors(failed))
-        outcomes = replay_all(recordings, plan, options.jobs)
+        stems = list(unique_stems(recordings))
+        outcomes = replay_all(recordings, stems, plan, options.jobs, options.scheduler)
         outcomes += [Outcome(str(error.path), plan.mode, error=str(error)) for error in failed]
         if not all(outcome.error for outcome in outcomes):
             print_table(outcomes)
+        told: set[str] = set()  # the valves of one file share what is wrong with it
         for outcome in outcomes:
-            report_problems(outcome.problems)
+            report_problems([text for text in outcome.problems if text not in told])
+            told.update(outcome.problems)
         if options.out:
             write_outcomes(outcomes, options.out)
             print(f'written: {options.out}')
     except SettingsError as error:
         print(f'replay: {with_suggestions(error)}', file=sys.stderr)
         return 2
-    except (BagError, ReferenceFileError, RuntimeError, OSError) as error:
+    except (BagError, ReferenceFileError, RuntimeError, OSError, ImportError) as error:
         print(f'replay: {error}', file=sys.stderr)
         return 1
     except KeyboardInterrupt:
@@ -261,44 +264,6 @@ def report_errors(errors: Sequence[object]) -> int:
     return int(bool(errors))
 
 
-def replay_all(recordings: Sequence[Recording], plan: Plan, jobs: int) -> list[Outcome]:
-    """
-    Replay recordings over several processes with a progress bar.
-
-    :param recordings: what to replay.
-    :param plan: how.
-    :param jobs: processes at most.
-    :return: what became of each, in order.
-    """
-    stems = list(unique_stems(recordings))
-    tasks = [
-        (recording, _placed(plan, recording), stem)
-        for recording, stem in zip(recordings, stems, strict=True)
-    ]
-    with tqdm(unit=' samples', unit_scale=True, disable=None, leave=False) as bar:
-        if min(jobs, len(tasks)) <= 1:
-            warm_up([plan])
-            return [replay(recording, where, bar.update, stem) for recording, where, stem in tasks]
-        context = multiprocessing.get_context('spawn')
-        counter = context.Value('q', 0)
-        workers = min(jobs, len(tasks))
-        with ProcessPoolExecutor(
-            workers, context, initializer=_start, initargs=(counter, plan, workers)
-        ) as pool:
-            waiting = futures = [pool.submit(_work, *task) for task in tasks]
-            while waiting:
-                waiting = list(wait(waiting, timeout=0.2).not_done)
-                bar.update(counter.value - bar.n)
-            return [future.result() for future in futures]
-
-
-def _placed(plan: Plan, recording: Recording) -> Plan:
-    """Put bags next to the input where no folder is given."""
-    if plan.bags != BESIDE:
-        return plan
-    return replace(plan, bags=recording.path.resolve().parent)
-
-
 def unique_stems(recordings: Sequence[Recording]) -> Iterator[str]:
     """Yield a file name for each recording, no two alike."""
     taken: set[str] = set()
@@ -306,27 +271,14 @@ def unique_stems(recordings: Sequence[Recording]) -> Iterator[str]:
         stem = _SUFFIX.sub('', recording.path.resolve().name)
         if recording.table and recording.table.name:
             stem += f'_{recording.table.name}'
+        elif recording.valve:
+            stem += recording.valve.replace('/', '_')
         elif recording.topic != '/measurement':
             stem += recording.topic.removesuffix('measurement').rstrip('/').replace('/', '_')
         stem = _UNSAFE.sub('_', stem)  # topics are text from outside
         names = chain([stem], (f'{stem}_{number}' for number in count(2)))
         taken.add(stem := next(name for name in names if name not in taken))
         yield stem
-
-
-def _start(counter: 'Synchronized[int]', plan: Plan, workers: int) -> None:
-    global _counter
-    _counter = counter
-    loading.THREADS = max(1, loading.THREADS // workers)  # the cores are busy
-    warm_up([plan])
-
-
-def _work(recording: Recording, plan: Plan, stem: str) -> Outcome:
-    def progress(count: int) -> None:
-        with _counter.get_lock():
-            _counter.value += count
-
-    return replay(recording, plan, progress, stem)
 
 
 if __name__ == '__main__':

@@ -40,6 +40,7 @@ class Ages:
         self._window = np.zeros(count)  # when the present window began [s]
         self._lowest = np.full(count, np.inf)  # delay in it [s]
         self._before = np.full(count, np.inf)  # delay in the one before [s]
+        self._even = False  # no valve is paused, and of each the time between blocks is known
 
     def heard(self, valve: Ints, stamp: Ints, steady: float) -> None:
         """
@@ -57,6 +58,11 @@ class Ages:
         first = (before < 0) | (now < before - int(BACK * SECOND))
         first |= (before >= DATE) != (now >= DATE)  # another run: its stamps begin anew
         usual = self._usual[v]
+        if self._even and not (first | (gap > np.maximum(INTERRUPTED, MISSED * usual))).any():
+            self._usual[v] = usual + 0.2 * (gap - usual)
+            self._least[v] = np.minimum(self._least[v], delay)
+            self._stamp[v], self._delay[v], self._steady[v] = now, delay, steady
+            return
         known = np.isfinite(usual)
         paused = ~first & (gap > np.maximum(INTERRUPTED, MISSED * usual))
         pause = np.where(first, 0.0, self._pause[v])
@@ -68,6 +74,7 @@ class Ages:
         self._least[v] = np.minimum(np.where(first, delay, self._least[v]), delay)
         self._stamp[v], self._delay[v], self._steady[v] = now, delay, steady
         self._forgive(v[self._pause[v] > 0.0], steady)
+        self._even = bool(np.isfinite(self._usual).all()) and not self._pause.any()
 
     def _forgive(self, v: Ints, steady: float) -> None:
         """Count a pause as none where samples run on with an even delay, which no queue has."""

@@ -7,13 +7,14 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from damadics_msgs.msg import MeasurementBlock
+from damadics_msgs.msg import FleetLayout, MeasurementBlock
 
 from damadics_fd.core.record import Floats, Ints
 from damadics_fd.core.sample import SIGNALS
 
 MOST_ROWS = 1_000_000  # of one block
 MOST_SENDERS = 100  # that are told apart: frame_id is text from outside
+ELSEWHERE, UNNAMED = -1, -2  # instead of a valve: one of another process, none
 LAYOUT, LENGTHS, ROWS = 'another layout', 'lengths differ', 'too many rows'
 UNKNOWN, STAMP = 'unknown valve', 'stamp before time began'
 
@@ -48,34 +49,80 @@ def layout_version(valves: Sequence[str], actuators: Sequence[str]) -> int:
     return zlib.crc32(text.encode()) or 1
 
 
-def check(message: MeasurementBlock, version: int, count: int) -> tuple[Rows, list[Refusal]]:
+class OtherLayouts:
+    """
+    Say which valves of a fleet the indices of other senders mean, by the layouts they publish.
+
+    :param valves: namespaces of the fleet, in the order of its own numbers.
+    """
+
+    def __init__(self, valves: Sequence[str]) -> None:
+        self._number = {name: n for n, name in enumerate(valves)}
+        self._numbers: dict[int, Ints] = {}
+
+    def learn(self, layout: FleetLayout) -> None:
+        """
+        Take note of a list of valves, which may hold such as are not of this fleet.
+
+        :param layout: of a gateway, or of the fleet itself.
+        """
+        if len(layout.valve) > MOST_ROWS:
+            return
+        while len(self._numbers) >= MOST_SENDERS and layout.version not in self._numbers:
+            del self._numbers[next(iter(self._numbers))]
+        names = ('/' + name.strip('/') for name in layout.valve)
+        self._numbers[layout.version] = np.array(
+            [self._number.get(name, ELSEWHERE) for name in names], np.int64
+        )
+
+    def numbers(self, version: int) -> Ints | None:
+        """
+        Return what the indices of a layout mean.
+
+        :param version: of the layout.
+        :return: numbers of the fleet by index, `ELSEWHERE` for a valve that is not of it; None
+            where the layout is not known.
+        """
+        return self._numbers.get(version)
+
+
+def check(
+    message: MeasurementBlock, version: int, count: int, others: OtherLayouts | None = None
+) -> tuple[Rows, list[Refusal]]:
     """
     Check a block.
 
     :param message: the block.
-    :param version: of the layout that it must refer to.
-    :param count: number of valves in the layout.
-    :return: the rows that may be taken, and what was refused and why.
+    :param version: of the fleet's own layout.
+    :param count: number of valves in it.
+    :param others: layouts of senders, which it may refer to as well.
+    :return: the rows that may be taken, and what was refused and why. Rows of valves that other
+        processes judge are neither.
     """
-    valve = np.asarray(message.valve, np.uint32).astype(np.int64)
-    stamp = np.asarray(message.stamp, np.int64)
-    known = valve[valve < count]
-    if message.layout != version:
+    own = message.layout == version
+    numbers = np.arange(count) if own else others.numbers(message.layout) if others else None
+    if numbers is None:
         # the indices mean other valves there
         return nothing(), [Refusal(LAYOUT, np.empty(0, np.int64))]
-    if len(valve) > MOST_ROWS:
-        return nothing(), [Refusal(ROWS, known)]
+    index = np.asarray(message.valve, np.uint32).astype(np.int64)
+    stamp = np.asarray(message.stamp, np.int64)
     columns = {name: np.asarray(getattr(message, name), np.float64) for name in SIGNALS}
     signals = {name: column for name, column in columns.items() if len(column)}
-    if any(len(column) != len(valve) for column in (stamp, *signals.values())):
-        return nothing(), [Refusal(LENGTHS, known)]
+    wrong = [LENGTHS] if any(len(x) != len(index) for x in (stamp, *signals.values())) else []
+    wrong += [ROWS] if len(index) > MOST_ROWS else []
+    if own and not wrong and len(index) and int(index.max()) < count and int(stamp.min()) >= 0:
+        return Rows(index, stamp, signals), []  # as nearly every block
+    valve = np.full(len(index), UNNAMED)
+    valve[index < len(numbers)] = numbers[index[index < len(numbers)]]
+    if wrong:
+        return nothing(), [Refusal(wrong[-1], valve[valve >= 0])]
     refused = []
-    good = np.ones(len(valve), np.bool_)
-    for reason, wrong in ((UNKNOWN, valve >= count), (STAMP, stamp < 0)):
-        if wrong.any():
-            rows = valve[wrong & good]
-            refused.append(Refusal(reason, rows[rows < count]))
-            good &= ~wrong
+    good = valve != ELSEWHERE
+    for reason, bad in ((UNKNOWN, valve == UNNAMED), (STAMP, stamp < 0)):
+        if (bad & good).any():
+            rows = valve[bad & good]
+            refused.append(Refusal(reason, rows[rows >= 0]))
+            good &= ~bad
     if good.all():
         return Rows(valve, stamp, signals), refused
     return (

@@ -106,6 +106,7 @@ class FleetNode(SpinnableNode):
             [one.namespace for one in self._members.all],
             [one.actuator for one in self._members.all],
         )
+        self._others = blocks.OtherLayouts([one.namespace for one in self._members.all])
         self._gathered: list[tuple[int, Sample]] = []
         self._jumps = Jumps(len(self._members))
         self._entities = Entities(self)
@@ -127,6 +128,7 @@ class FleetNode(SpinnableNode):
         self._telling.expose(exposed, self._gather)
         self._signatures.restore(range(exposed))
         made.subscription(MeasurementBlock, 'measurement_block', self._take_block, qos.BLOCKS)
+        made.subscription(FleetLayout, 'fleet/layout', self._others.learn, qos.EVENTS)
         made.timer(HEARTBEAT, self._beat)
         if exposed:
             made.timer(GATHER, self._judge_gathered)
@@ -140,7 +142,7 @@ class FleetNode(SpinnableNode):
         )
 
     def _take_block(self, message: MeasurementBlock) -> None:
-        rows, refusals = blocks.check(message, self._version, len(self._members))
+        rows, refusals = blocks.check(message, self._version, len(self._members), self._others)
         if refusals:
             sender = plain(message.header.frame_id, NAME)
             self._refused.note(refusals, sender)
@@ -165,7 +167,8 @@ class FleetNode(SpinnableNode):
         self._judged += len(rows.valve)
         self._rejected += taken.refused
         self._telling.tell(taken.happened)
-        for number in taken.changed - {number for number, _ in taken.happened}:
+        told = {number for number, _ in taken.happened}
+        for number in taken.changed - told if told else taken.changed:
             self._telling.flag(number)
 
     def _gather(self, number: int, data: bytes) -> None:

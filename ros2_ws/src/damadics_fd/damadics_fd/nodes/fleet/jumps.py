@@ -43,6 +43,10 @@ class Jumps:
         :return: what may be judged now; mostly the same rows.
         """
         last = self._last[rows.valve]
+        far = int(rows.stamp.max()) - int(last.min()) > JUMP * SECOND if len(last) else True
+        if not far and not self._held:  # as nearly always
+            self._note(rows.valve, rows.stamp, steady)
+            return rows
         room = steady - self._steady[rows.valve] + JUMP
         ahead = (last >= 0) & (rows.stamp - last > room * SECOND)
         if not ahead.any() and not self._held:

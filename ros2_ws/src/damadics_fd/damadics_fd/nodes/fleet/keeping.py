@@ -71,6 +71,8 @@ class Keeping:
         :param valve: of rows that are about to be judged.
         :param stamp: of these rows [ns].
         """
+        if not self._pending:
+            return
         for number, first in first_stamps(self._pending, valve, stamp):
             self._memory(number).begin(first)
 

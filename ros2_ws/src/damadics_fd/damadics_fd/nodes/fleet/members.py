@@ -126,7 +126,9 @@ class Members:
         return together
 
     def _take(self, b: int, rows: Rows) -> Taken:
-        changes = self.banks[b].take(self._place[rows.valve], rows.stamp, rows.signals)
+        alone = len(self.banks) == 1  # its places are the numbers
+        place = rows.valve if alone else self._place[rows.valve]
+        changes = self.banks[b].take(place, rows.stamp, rows.signals)
         refused = int(np.count_nonzero(changes.reason))
         told = np.flatnonzero(changes.decisions['transitions'])
         happened = [

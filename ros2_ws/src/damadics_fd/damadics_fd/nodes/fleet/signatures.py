@@ -75,6 +75,8 @@ class Signatures:
         :param valve: of rows that are about to be judged.
         :param stamp: of these rows [ns].
         """
+        if not self._pending:
+            return
         for number, first in first_stamps(self._pending, valve, stamp):
             self._publisher(number).begin(first)
 

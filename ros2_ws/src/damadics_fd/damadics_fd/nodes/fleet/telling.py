@@ -82,8 +82,10 @@ class Telling:
         :param rows: checked rows.
         :return: what became of them.
         """
+        if not self._watched:
+            return self._members.take(rows)
         watched = np.isin(rows.valve, self._watched)
-        if not self._watched or not watched.any():
+        if not watched.any():
             return self._members.take(rows)
         parts = [self._members.take(_some(rows, ~watched))] if not watched.all() else []
         for row in np.flatnonzero(watched):
