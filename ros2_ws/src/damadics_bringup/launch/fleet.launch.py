@@ -42,6 +42,7 @@ def valves(context):
                 package='damadics_fd',
                 executable='fleet',
                 respawn=True,
+                on_exit=unless_refused,
                 respawn_delay=1.0,
                 arguments=[LaunchConfiguration('fleet')],
                 # simulated plants send valve by valve
