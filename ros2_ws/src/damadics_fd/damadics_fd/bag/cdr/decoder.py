@@ -219,6 +219,8 @@ class Decoder:
             base, _, last = place.name.rpartition('.')
             if last == 'sec' and by_name.get(f'{base}.nanosec', place).dtype == 'u4':
                 found['stamp' if base == 'header.stamp' else base] = place.offset
+            elif place.name == 'stamp' and 'stamp' in found and 'stamp' not in (self.fields or ()):
+                continue  # blocks have a field of that name beside header.stamp
             elif not (last == 'nanosec' and f'{base}.sec' in by_name):
                 found['frame_id' if place.name == 'header.frame_id' else place.name] = place
         if self.fields is None:
