@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from damadics_fd.bag import BagError, BagWriter, read_columns, write_columns, write_parquet
 from damadics_fd.bag.blocks.reader import BlockReader
+from damadics_fd.bag.blocks.together import read_together
 from damadics_fd.bag.recording import find_recordings
 from damadics_fd.commands.replay.replay import main
 from damadics_fd.core.monitor import run
@@ -108,6 +109,7 @@ def test_parquet_of_many_valves_gives_what_the_blocks_give(tmp_path):
         assert piece[name].tobytes() == columns['/lv0'][name].tobytes()
 
 
+@pytest.mark.plain
 def test_rows_of_a_table_without_a_valve_are_refused(tmp_path, capsys):
     pyarrow = pytest.importorskip('pyarrow')
     from pyarrow import parquet
@@ -118,6 +120,7 @@ def test_rows_of_a_table_without_a_valve_are_refused(tmp_path, capsys):
     assert '1 rows name no valve' in capsys.readouterr().err
 
 
+@pytest.mark.plain
 def test_a_new_layout_renumbers_the_valves(tmp_path):
     with Blocks(tmp_path / 'a.mcap') as bag:
         bag.layout(1, ['/a', '/b'])
@@ -129,6 +132,7 @@ def test_a_new_layout_renumbers_the_valves(tmp_path):
         assert found['x1'].tolist() == x1, name
 
 
+@pytest.mark.plain
 def test_each_block_topic_has_the_layout_beside_it(tmp_path):
     for place, name in (('/north', '/n'), ('/south', '/s')):
         with Blocks(tmp_path / place[1:], f'{place}/measurement_block') as bag:
@@ -138,6 +142,7 @@ def test_each_block_topic_has_the_layout_beside_it(tmp_path):
     assert names == ['/n', '/n2', '/s', '/s2']
 
 
+@pytest.mark.plain
 def test_a_signal_that_no_valve_measures_is_not_a_number(tmp_path):
     with Blocks(tmp_path / 'a.mcap') as bag:
         bag.layout(1, ['/a', '/b'])
@@ -167,6 +172,7 @@ def odd(bag, what: str) -> None:
         bag.block(1, **three_rows(stamp=[30, -(2**63), 40]))
 
 
+@pytest.mark.plain
 @pytest.mark.parametrize(
     ('what', 'text', 'rows'),
     [
@@ -197,6 +203,7 @@ def test_odd_blocks_are_told_and_the_others_judged(tmp_path, capsys, what, text,
     assert len(results) == 2 and all(r['lossy'] and r['problems'] for r in results)
 
 
+@pytest.mark.plain
 @pytest.mark.parametrize(
     ('what', 'text'),
     [
@@ -215,6 +222,7 @@ def test_blocks_whose_valves_are_unknown_are_no_result(tmp_path, capsys, what, t
         read_columns(tmp_path / 'a.mcap', '/measurement_block', valve='/a')
 
 
+@pytest.mark.plain
 def test_a_valve_without_samples_is_not_monitored(tmp_path):
     with Blocks(tmp_path / 'a.mcap') as bag:
         bag.layout(1, ['/a', '/b', '/silent'])
@@ -246,3 +254,17 @@ def test_blocks_beside_single_topics(tmp_path):
         bag.write_columns(columns['/lv0']['stamp'], {'/lv9/measurement': own}, 'LV9')
     found = replayed(tmp_path / 'bags')
     assert [r['bag'].partition('#')[2] for r in found] == ['/lv0', '/lv1', '/lv9/measurement']
+
+
+@pytest.mark.plain
+def test_a_table_of_many_valves_has_the_rows_of_the_blocks(tmp_path):
+    pytest.importorskip('pyarrow')
+    with Blocks(tmp_path / 'a.mcap') as bag:
+        bag.layout(1, ['/a', '/b'])
+        bag.block(1, **three_rows(x1=[0.1, 0.2, 0.3]))
+    assert write_parquet(tmp_path / 'a.mcap', tmp_path / 'a.parquet') == 3
+    for path in (tmp_path / 'a.mcap', tmp_path / 'a.parquet'):
+        found = find_recordings([path])
+        rows = {found[n].name[-2:]: piece['x1'].tolist() for n, piece in read_together(found, str)}
+        assert rows == {'/a': [0.1, 0.3], '/b': [0.2]}
+        assert [c['x1'].tolist() for one in found for c in one.chunks(str)] == [[0.1, 0.3], [0.2]]
