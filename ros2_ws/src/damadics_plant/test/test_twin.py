@@ -50,7 +50,7 @@ def test_a_wrong_twin_is_refused_with_what_is_wrong(tmp_path, change, reason, ca
     with pytest.raises(ValueError, match=reason):
         read_twin(path)
     words = ['nominal', '--valve', str(path), '--out', str(tmp_path / 'a.csv'), '--quiet']
-    assert main(words) == 1
+    assert main(words) == 2
     assert reason.split(' is')[0] in capsys.readouterr().err
 
 
