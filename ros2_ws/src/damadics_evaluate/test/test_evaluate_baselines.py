@@ -44,7 +44,7 @@ def test_every_baseline_reacts_to_a_stuck_stem(name):
         faulty[700:, X] = faulty[700, X]
         loud = detector.statistic(faulty)
     except MissingPackageError as error:
-        pytest.skip(str(error))
+        pytest.skip(str(error))  # a library of the extra `baselines`, named with its remedy
     assert quiet.shape == loud.shape == (1000,)
     assert not quiet[:300].any()  # no test in the set-up zone
     assert np.isfinite(loud).all()

@@ -56,7 +56,7 @@ class Table:
         :return: `valve` (index into `valves`), `stamp` and the signals.
         :raises BagError: as `chunks`.
         """
-        raise NotImplementedError
+        raise NotImplementedError  # asked where `valve` names one; text has no such column
 
     def chunks(self, on_problem: Told) -> Iterator[Columns]:
         """
@@ -65,7 +65,7 @@ class Table:
         :param on_problem: told what is left out.
         :raises BagError: where it is no table of numbers.
         """
-        raise NotImplementedError
+        raise NotImplementedError  # each kind of file has its own
 
     def timed(
         self, stamp: NDArray[np.float64], columns: Mapping[str, Column], where: str, tell: Told
