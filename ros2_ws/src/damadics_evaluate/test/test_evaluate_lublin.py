@@ -118,6 +118,18 @@ def test_parts_of_daily_files_are_put_together(tmp_path, capsys):
     assert 'learned on 2001-11-17 A3: 52880-53780 s' in out.out
 
 
+@pytest.mark.parametrize('form', ['   {:.7e}', '{:.7e}\t', ' {:12.4f}', '{:.4f};', '{:.4f},'])
+def test_daily_files_are_read_however_their_columns_are_parted(form, tmp_path):
+    table = plant(52880, 52980)
+    lines = [''.join(form.format(value) for value in row) for row in table]
+    (tmp_path / '17112001.txt').write_text('\r\n'.join(lines) + '\r\n')
+    record = read_folder(tmp_path, pytest.fail)
+    for actuator, first in ((1, 1), (2, 17), (3, 23)):
+        columns = record[DAY, actuator]
+        assert columns['stamp'].tolist() == [int(t) * 10**9 for t in table[:, 0]]
+        assert columns['x1'] == pytest.approx(table[:, first + 5] / 100.0, abs=1e-4)
+
+
 def test_the_user_states_the_stretch_to_learn_from(tmp_path, capsys):
     folder = tmp_path / 'days'
     folder.mkdir()

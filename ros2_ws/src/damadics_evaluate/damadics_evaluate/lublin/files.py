@@ -11,7 +11,7 @@ import numpy as np
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.mapping import Scale
 from damadics_fd.bag.tables.headers import LUBLIN, TAGS, Assignment, Use, tag_matches
-from damadics_fd.bag.tables.sniff import Layout
+from damadics_fd.bag.tables.sniff import BLANKS, Layout
 from damadics_fd.bag.tables.table import TextTable
 
 from damadics_evaluate.columns import NANOSECONDS, Columns
@@ -109,7 +109,7 @@ def read_file(file: Path, on_problem: Callable[[str], None]) -> dict[int, Column
         if {'stamp', 'cv', 'x1'} <= use.keys():
             time, _ = use.pop('stamp')
             signals = {name: Use(column, scale) for name, (column, scale) in use.items()}
-            layout = Layout('utf-8', delimiter or ' ', (), (), header, ())
+            layout = Layout('utf-8', delimiter or BLANKS, (), (), header, ())
             where = Assignment(signals, (time,), Scale())
             table = TextTable(file, f'A{actuator}', where, layout)
             chunks = list(table.chunks(on_problem))

@@ -102,6 +102,8 @@ DATED = {
     'capitals': rows('Time,CV,X1,PS', lambda i: iso(STAMP[i])),
     'milliseconds by name': rows('time_ms,cv,x1,ps', lambda i: str(STAMP[i] // 10**6)),
     'tabs': rows('time\tcv\tx1\tps', lambda i: iso(STAMP[i]), '\t'),
+    'blanks': rows('  time  cv x1   ps', lambda i: f'   {STAMP[i] / 1e9:.16e}', '   '),
+    'blanks and tabs': rows('% time \t cv \t x1 \t ps', lambda i: f' {iso(STAMP[i])}', ' \t '),
 }
 
 

@@ -15,7 +15,8 @@ from damadics_fd.bag.tables.times import is_date
 SAMPLE = 1 << 18  # [B] at the beginning of the file
 LINES = 400  # looked at
 PREAMBLE = 100  # lines at most
-DELIMITERS = '\t;|,'  # in this order: a comma may be a decimal one
+BLANKS = ' '  # any number of blanks and tabs, as MATLAB writes columns
+DELIMITERS = '\t;|,' + BLANKS  # in this order: a comma may be a decimal one
 NOT_MEASURED = (
     ('', '-', '--', '---', 'na', 'n/a', '#n/a', 'nan', 'null', '<null>', 'none')
     + ('bad', 'no data', 'nodata', 'bad input', 'i/o timeout', '?')
@@ -28,7 +29,7 @@ class Layout:
     How a text table is written.
 
     :param encoding: of the file.
-    :param delimiter: between the fields.
+    :param delimiter: between the fields; `BLANKS` for any number of them.
     :param names: header line, empty where there is none.
     :param units: line of units below it, empty where there is none.
     :param skipped: lines before the data.
@@ -71,7 +72,14 @@ def is_value(cell: str) -> bool:
 
 
 def split(line: str, delimiter: str) -> list[str]:
-    """Return the cells of a line."""
+    """
+    Return the cells of a line.
+
+    >>> split('a;"b;c";', ';'), split('   1.0e+00   2.5', BLANKS)
+    (['a', 'b;c', ''], ['1.0e+00', '2.5'])
+    """
+    if delimiter == BLANKS:
+        line = BLANKS.join(line.split())
     if '"' not in line:
         return line.rstrip('\r\n').split(delimiter)
     try:

@@ -16,7 +16,7 @@ from damadics_fd.bag.arrays import Column, Columns
 from damadics_fd.bag.errors import BagError, NoMeasurementError
 from damadics_fd.bag.mapping import Scale, Source
 from damadics_fd.bag.tables.headers import LUBLIN, SECOND, Assignment, assign, headers
-from damadics_fd.bag.tables.sniff import Layout, parse_cell, sniff, split
+from damadics_fd.bag.tables.sniff import BLANKS, Layout, parse_cell, sniff, split
 from damadics_fd.bag.tables.times import Dates, is_date, seconds_of
 
 ROWS = 100_000  # read at a time
@@ -103,6 +103,7 @@ class TextTable(Table):
         use = sorted({*self.assignment.time, *(s.column for s in signals.values())})
         place = {column: i for i, column in enumerate(use)}
         dates, scale = self._clock()
+        delimiter = None if self.layout.delimiter == BLANKS else self.layout.delimiter
         with self.path.open(encoding=self.layout.encoding, errors='replace') as file:
             row = self.layout.skipped
             for _ in islice(file, row):
@@ -112,9 +113,7 @@ class TextTable(Table):
                 try:
                     if dates:
                         raise ValueError
-                    block = np.loadtxt(
-                        lines, delimiter=self.layout.delimiter, usecols=use, ndmin=2
-                    )
+                    block = np.loadtxt(lines, delimiter=delimiter, usecols=use, ndmin=2)
                 except ValueError:
                     block, stamps = self._by_line(lines, row, use, dates, on_problem)
                 row += len(lines)
