@@ -7,7 +7,8 @@ import math
 
 import numpy as np
 import pytest
-from damadics_fd.core.bank import Bank
+from damadics_fd.core.bank import Bank, ahead
+from damadics_fd.core.bank.approximators import Approximators
 from damadics_fd.core.decision.events import Decision
 from damadics_fd.core.monitor import monitor_for
 from damadics_fd.core.quality import Reason
@@ -15,6 +16,7 @@ from damadics_fd.core.result import events_in
 from damadics_fd.core.sample import COLUMNS, SIGNALS
 from damadics_fd.core.scada.naming.looks import Looks
 from damadics_fd.core.settings import Settings
+from damadics_fd.core.signature.state import NO_CLASSES
 from damadics_plant import simulate
 
 from .synthetic import valve
@@ -233,3 +235,42 @@ def test_banks_refuse_mixed_modes_and_foreign_states():
         Bank([Settings.for_mode('monitor')]).restore_bytes(0, bank.tobytes(0))
     with pytest.raises(IndexError):
         bank.detector(2)
+
+
+@pytest.fixture
+def small_cache(monkeypatch):
+    """Let three valves be too many for the cache."""
+    monkeypatch.setattr(ahead, 'CACHE', 1000)
+
+
+def test_what_is_fetched_ahead_are_the_records_of_the_next_valve(small_cache):
+    held = Approximators(settings_of('monitor'), NO_CLASSES)
+    for v in range(3):
+        seen = set()
+        for first, step in held.ahead.tolist():
+            address = first + v * step
+            (k,) = (
+                k
+                for k, records in enumerate(held.state_arrays())
+                if 0 <= address - records[v : v + 1].ctypes.data < records.itemsize
+            )
+            seen.add(k)
+        assert len(seen) == len(held.state_arrays()) - 1, 'all but the samples refused last'
+    held.ahead[:] = 12_345  # a place that is not the process's: asking for it changes nothing
+    ahead.fetch(held.ahead, 2)
+
+
+def test_few_valves_stay_in_the_cache():
+    assert not len(Approximators(settings_of('monitor'), NO_CLASSES).ahead)
+
+
+def test_valves_that_do_not_fit_the_cache_get_the_same_bits(monkeypatch):
+    number, rows = mixed([recording(800, seed=seed) for seed in (1, 2, 3)])
+    found = []
+    for cache in (0, ahead.CACHE):
+        monkeypatch.setattr(ahead, 'CACHE', cache)
+        bank = Bank(settings_of('paper'))
+        reasons, news = fed(bank, number, rows)
+        states = [bank.detector(v).signature.state.tolist() for v in range(3)]
+        found.append((reasons.tolist(), news, bank.decisions.tolist(), states))
+    assert str(found[0]) == str(found[1])

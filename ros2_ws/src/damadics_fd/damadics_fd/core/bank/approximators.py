@@ -8,6 +8,7 @@ from contextlib import contextmanager
 import numpy as np
 
 from damadics_fd.core.approximator.estimator import Estimator
+from damadics_fd.core.bank.ahead import Part, offset_of, places
 from damadics_fd.core.bank.held import Held
 from damadics_fd.core.bank.rows import Reasons, take_approximator
 from damadics_fd.core.decision.events import Decision
@@ -27,6 +28,20 @@ class Approximators(Held):
         super().__init__(settings, classes)
         firsts = stacked(Estimator(one).state for one in self.settings)
         self.states = firsts[self.which]
+        kind = self.signatures.dtype
+        theta, now, work = (offset_of(kind, name) for name in ('theta', 'now', 'work'))
+        self.ahead = places(
+            [
+                Part(self.quality),
+                Part(self.states),
+                Part(self.detectors),
+                Part(self.estimates),
+                Part(self.decisions),
+                Part(self.signatures, 0, theta),  # what lies between is needed now and then
+                Part(self.signatures, now, work),
+            ]
+        )
+        self._room = np.empty(0, Decision.dtype())  # for decisions, kept from call to call
 
     def take(
         self, valve: Ints, stamp: Ints, signals: Sequence[Floats]
@@ -41,8 +56,11 @@ class Approximators(Held):
         """
         n = len(valve)
         reason, changed = np.empty(n, np.uint8), np.empty(n, np.int64)
-        decisions = np.empty(n, Decision.dtype())
+        if len(self._room) < n:
+            self._room = np.empty(n, Decision.dtype())
+        decisions = self._room
         count = take_approximator(
+            self.ahead,
             self.quality,
             self.refused,
             self.states,
@@ -60,7 +78,7 @@ class Approximators(Held):
             stamp,
             *signals,
         )
-        return reason, changed[:count], decisions[:count]
+        return reason, changed[:count], decisions[:count].copy()
 
     def estimator(self, v: int) -> Estimator:
         """

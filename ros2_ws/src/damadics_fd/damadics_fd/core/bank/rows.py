@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from damadics_fd.core.approximator import step as approximator
 from damadics_fd.core.approximator.state import Estimate, State
+from damadics_fd.core.bank.ahead import fetch
 from damadics_fd.core.decision import judge
 from damadics_fd.core.jit import jit
 from damadics_fd.core.quality import ACCEPTED, Quality
@@ -103,6 +104,7 @@ def decide(
 
 @jit
 def take_approximator(
+    where: Ints,
     q: Rows[Quality],
     r: Rows[LastRefused],
     s: Rows[State],
@@ -129,6 +131,7 @@ def take_approximator(
     """
     Take rows of valves in the modes paper and monitor.
 
+    :param where: the records of a valve, as `ahead.places` returns it.
     :param q: quality states; these and the following hold a record per valve.
     :param r: the samples refused last.
     :param s: estimator states.
@@ -149,6 +152,8 @@ def take_approximator(
     count = 0
     for i in range(len(valve)):
         v = valve[i]
+        if i + 1 < len(valve):
+            fetch(where, valve[i + 1])
         w = which[v]
         reason[i] = approximator.step(
             q[v],

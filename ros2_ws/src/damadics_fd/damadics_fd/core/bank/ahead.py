@@ -1,0 +1,104 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Bring the records of the next valve into the cache while the present one is judged.
+
+The records of thousands of valves do not fit the cache; without this the loop waits for memory
+for a third of its time. It changes no value.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from llvmlite import ir
+from numba.core import types
+from numba.core.base import BaseContext
+from numba.core.typing.context import BaseContext as Typing
+from numba.core.typing.templates import Signature
+from numba.extending import intrinsic
+
+from damadics_fd.core.jit import jit, settings
+from damadics_fd.core.record import Array, Ints
+
+Lower = Callable[[BaseContext, ir.IRBuilder, Signature, Sequence[ir.Value]], ir.Value]
+LINE = 64  # bytes of the cache that come at once
+CACHE = 1 << 22  # bytes of records that the cache holds: nothing is to be fetched ahead
+
+
+class Part(NamedTuple):
+    """Name the bytes of each record of an array that a sample needs."""
+
+    records: Array
+    first: int = 0
+    end: int | None = None  # None: up to the end of the record
+
+
+def offset_of(kind: np.dtype[np.void], name: str) -> int:
+    """
+    Return where a field of a record begins.
+
+    :param kind: of the record.
+    :param name: of the field.
+    :return: bytes from the begin of the record.
+    """
+    fields = kind.fields
+    assert fields is not None
+    return fields[name][1]
+
+
+def places(parts: Iterable[Part]) -> Ints:
+    """
+    Say where the bytes are that a sample of a valve needs.
+
+    :param parts: of arrays with a record of each valve, which stay where they are.
+    :return: address for valve 0 and step from valve to valve, for each line of the cache, shape
+        (lines, 2);
+        none where the cache holds all.
+    """
+    found: list[tuple[int, int]] = []
+    needed = 0
+    for records, first, end in parts:
+        size = records.dtype.itemsize
+        offsets = range(first, size if end is None else end, LINE)
+        found += [(records.ctypes.data + offset, size) for offset in offsets]
+        needed += len(records) * len(offsets) * LINE
+    return np.array(found if needed > CACHE else [], np.int64).reshape(-1, 2)
+
+
+def _line(address: int) -> None:
+    """Ask for one line of the cache; without a compiler there is nothing to ask."""
+
+
+if not settings.DISABLE_JIT:
+
+    @intrinsic
+    def _line(typing: Typing, address: types.Type) -> tuple[Signature, Lower]:
+        """Compile to the machine's instruction for that, which cannot fail at any address."""
+
+        def lower(
+            context: BaseContext,
+            builder: ir.IRBuilder,
+            signature: Signature,
+            arguments: Sequence[ir.Value],
+        ) -> ir.Value:
+            pointer, number = ir.IntType(8).as_pointer(), ir.IntType(32)
+            kind = ir.FunctionType(ir.VoidType(), [pointer, number, number, number])
+            function = builder.module.declare_intrinsic('llvm.prefetch', [pointer], kind)
+            at = builder.inttoptr(arguments[0], pointer)
+            to_write, near, data = number(1), number(3), number(1)
+            return builder.call(function, [at, to_write, near, data])
+
+        return types.void(types.int64), lower
+
+
+@jit
+def fetch(where: Ints, v: int) -> None:
+    """
+    Ask for the records of a valve.
+
+    :param where: as `places` returns it.
+    :param v: which valve.
+    """
+    for k in range(len(where)):
+        _line(where[k, 0] + v * where[k, 1])
