@@ -25,7 +25,6 @@ ENDINGS = {
     'ps': r'(?:PS|PCH|CHAMBER\w*|ACTUATOR_?P\w*)',
 }
 SPLIT = re.compile(r'^(?P<valve>.*?[0-9][0-9A-Za-z]*?)[._\-/ ]?(?P<end>[A-Za-z][A-Za-z_]*[0-9]?)$')
-NUMERIC = range(2, 12)  # built-in types SByte .. Double
 
 
 class Variable(NamedTuple):

@@ -19,7 +19,6 @@ from damadics_msgs.msg import Signature
 from damadics_dashboard.live.motion import Motion
 from damadics_dashboard.live.valve import Valve
 
-OLDEST = 10.0  # s; an older signature is not one of now
 DATED = 1e8  # s; smaller times count from the start of a simulation
 WATCHING = (Signature.STATE_MONITOR, Signature.STATE_ALARM)
 

@@ -58,11 +58,6 @@ class Scada(Detector):
         """Return the largest statistic over its limit."""
         return np.asarray(self.trace(samples)['ratio'])
 
-    def alarm_time(self) -> float | None:
-        """Return when the last run raised the alarm, s."""
-        state = self.monitor.state
-        return float(state.t_alarm) if state.alarm else None
-
     def first_test(self) -> str | None:
         """Return the test that raised the alarm of the last run."""
         state = self.monitor.state

@@ -165,22 +165,6 @@ class Intervals:
                     last = row[1] if last is None else max(last, row[1])
         return None if first is None or last is None else (float(first), float(last))
 
-    def drop_after(self, valve: str, stamp: float) -> None:
-        """
-        Drop what lies in the future: the clock was set back.
-
-        :param valve: name of the valve.
-        :param stamp: present time [s].
-        :raises sqlite3.Error: where the file cannot be written.
-        """
-        with self._lock, self._db:
-            for level in LEVELS:
-                self._db.execute(
-                    f'DELETE FROM point_{level} WHERE start > ? AND valve = '
-                    '(SELECT id FROM valve WHERE name = ?)',
-                    (stamp, valve),
-                )
-
     def forget(self, now: float) -> None:
         """
         Drop the intervals that are kept no longer; longer ones tell of their time.

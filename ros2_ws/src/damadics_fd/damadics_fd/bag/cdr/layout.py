@@ -33,8 +33,6 @@ from damadics_fd.bag.errors import BagError
 HEADER = b'\x00\x01\x00\x00'  # plain CDR, little endian
 HEADER_SIZE = len(HEADER)
 MOST_ELEMENTS = 1 << 16  # places walked in one message; longer ones are no columns
-TIME = 'builtin_interfaces/msg/Time'
-DURATION = 'builtin_interfaces/msg/Duration'
 NANO = 1_000_000_000
 
 

@@ -103,11 +103,6 @@ class McapWriter:
         """Messages in the open chunk."""
         return self._waiting
 
-    @property
-    def message_count(self) -> int:
-        """Messages written so far."""
-        return self._ending.counts.total()
-
     def add_schema(self, name: str, encoding: str, data: bytes) -> int:
         """Write a schema and return its number."""
         schema = Schema(self._ending.schemas + 1, name, encoding, data)
