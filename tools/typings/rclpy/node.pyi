@@ -106,7 +106,7 @@ class Node:
     def create_timer(
         self,
         timer_period_sec: float,
-        callback: Callable[[], None],
+        callback: Callable[[], object],
         callback_group: None = None,
         clock: Clock | None = None,
     ) -> Timer: ...

@@ -57,6 +57,7 @@ class DetectorNode(MonitoringNode):
 
     def __init__(self, arguments: list[str] | None = None, joints: Joints | None = None) -> None:
         self._joints = joints or Joints()
+        self.rounds = self._joints.rounds
         super().__init__('detector', 'estimate', START_ESTIMATOR, arguments)
         self._alarms = self._folder_of(self._alarm_folder)
         self._kept = self._folder_of(self._signature_folder, self._valve())
@@ -112,6 +113,8 @@ class DetectorNode(MonitoringNode):
         self._flag.header.frame_id = self.actuator
         self._residual = made.publisher(Float64Stamped, 'residual', qos.SAMPLES)
         self._threshold = made.publisher(Float64Stamped, 'threshold', qos.SAMPLES)
+        self._residual_heard = self._residual.handle.get_subscription_count
+        self._threshold_heard = self._threshold.handle.get_subscription_count
         self._fault_flag = made.publisher(FaultFlag, 'fault_flag', qos.FLAG)
         self._fault_event = made.publisher(FaultEvent, 'fault_event', qos.EVENTS)
         self._isolation = made.publisher(Isolation, 'isolation', qos.FLAG)
@@ -136,20 +139,16 @@ class DetectorNode(MonitoringNode):
         self._strokes = PartialStrokes(
             made, actions, self._core, self._stroke_limits, lambda: self._blind
         )
-        made.timer(min(self.watch.timeout / 5.0, HEARTBEAT), self._look)
-        made.timer(HEARTBEAT, self._beat)
+        made.every(min(self.watch.timeout / 5.0, HEARTBEAT), self._look)
+        made.every(HEARTBEAT, self._beat)
         self._join(self.watch.subscribe(EstimateMessage, self._read, self._take, qos.SAMPLES))
         self._publish_flag()
 
     def _join(self, heard: Callable[[Estimate, str], None]) -> None:
         """Take estimates of an estimator in this process directly; errors as from a topic."""
-
-        def take(found: tuple[Estimate, str]) -> None:
-            heard(*found)
-
-        contained = self.entities.contained('estimate', take)
+        take = self.entities.contained('estimate', heard)
         hear = self.entities.contained('isolation', self._hear)
-        self._taker = Taker(lambda estimate, tag: contained((estimate, tag)), hear)
+        self._taker = Taker(take, hear)
         takers = self._joints.at(self.resolve_topic_name('estimate')).takers
         takers.append(self._taker)
         self.entities.on_release(lambda: takers.remove(self._taker))
@@ -210,9 +209,9 @@ class DetectorNode(MonitoringNode):
         before, self._decision = self._decision, decision
         if self._tag != tag:
             self._tag = self._flag.header.frame_id = tag
-        if self._residual.get_subscription_count():
+        if self._residual_heard():
             self._residual.publish(self._encode(decision.stamp, tag, decision.residual))
-        if self._threshold.get_subscription_count():
+        if self._threshold_heard():
             self._threshold.publish(self._encode(decision.stamp, tag, decision.threshold))
         turned = self._was_silent and self._look()
         if not turned and (before is None or decision.shown != before.shown):
@@ -221,7 +220,7 @@ class DetectorNode(MonitoringNode):
 
     def _keep(self, decision: Decision, tag: str) -> None:
         """Tell transitions, and keep alarm and signature for a restart."""
-        if decision.events:
+        if decision.transitions:
             self._tell(self._live.tell(decision.events), tag)
             self._decision = self._core.decision
         self._signature.update(decision.stamp, tag)

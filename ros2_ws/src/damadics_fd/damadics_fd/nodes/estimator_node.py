@@ -32,7 +32,7 @@ from damadics_fd.ros import qos
 from damadics_fd.ros.arguments import check_node_arguments
 from damadics_fd.ros.conversions import judgement_message
 from damadics_fd.ros.diagnostics import Level, Report
-from damadics_fd.ros.raw import EstimateEncoder, any_sample
+from damadics_fd.ros.raw import EstimateEncoder, SampleReader
 from damadics_fd.ros.spin import spin
 
 DESCRIPTION = 'Estimate velocity and residual of one valve with the on-line approximator.'
@@ -55,6 +55,7 @@ class EstimatorNode(MonitoringNode):
 
     def __init__(self, arguments: list[str] | None = None, joints: Joints | None = None) -> None:
         self._joints = joints or Joints()
+        self.rounds = self._joints.rounds
         super().__init__('estimator', 'measurement', START_PLANT, arguments)
         self.check_folders(reference=self._path.parent if self._path else None)
         estimator_for(self.settings).update(*READY)
@@ -79,10 +80,11 @@ class EstimatorNode(MonitoringNode):
         self._encoder = EstimateEncoder()
         self._joint = self._joints.at(self.resolve_topic_name('estimate'))
         self._progress = 0.0
-        self._last = self._core.phase
+        self._last, self._phase = self._core.phase, -1
         self._refused_at = -math.inf  # monotonic time of the last refused sample [s]
         self._frozen = FrozenPosition()
         self._publisher = made.publisher(EstimateMessage, 'estimate', qos.SAMPLES)
+        self._heard = self._publisher.handle.get_subscription_count
         self._judgement: Judgement | None = None
         if self._core.stride:
             self._isolation = made.publisher(Isolation, 'isolation', qos.FLAG)
@@ -93,7 +95,7 @@ class EstimatorNode(MonitoringNode):
             self, made, self._actions, self._core, self.actuator, self.settings, self._path
         )
         self._reference.restore()
-        self.watch.subscribe(Measurement, any_sample, self._take, qos.SAMPLES)
+        self.watch.subscribe(Measurement, SampleReader(), self._take, qos.SAMPLES)
 
     def _take(self, sample: Sample, tag: str) -> None:
         if not self.active:
@@ -107,7 +109,9 @@ class EstimatorNode(MonitoringNode):
         self._progress = estimate.progress
         self._tell_judgement(tag)  # first, for the alarm that the estimate may raise
         self._give(estimate, tag)
-        phase = self._core.phase
+        if estimate.phase == self._phase:
+            return
+        self._phase, phase = estimate.phase, self._core.phase
         if phase != self._last:
             learned = phase == 'monitor' and self._last.startswith('learn')
             self._last = phase
@@ -118,7 +122,7 @@ class EstimatorNode(MonitoringNode):
     def _give(self, estimate: Estimate, tag: str) -> None:
         """Hand an estimate to the detector beside, and publish it for whoever else listens."""
         takers = self._joint.takers
-        if not takers or self._publisher.get_subscription_count() > len(takers):
+        if not takers or self._heard() > len(takers):
             for taker in takers:
                 taker.sent(estimate.stamp)
             self._publisher.publish(self._encoder.encode(estimate, tag))

@@ -19,6 +19,7 @@ from damadics_fd.ros.freshness import ForwardJumps, Freshness
 FIRST_WORD = 0.8  # s of wall time after the start
 NEXT_WORDS = 30.0  # s
 HISTORY = 3600.0  # s; older samples are a replay
+COUNTED_EVERY = 0.5  # s
 PERIODS = 3.0  # slower samples than the timeout allows for may be late by so many periods
 
 
@@ -73,6 +74,7 @@ class InputWatch:
         self._far: Callable[[], int] = lambda: 0  # messages whose stamp alone ran far ahead
         self._tag = ''  # that came last
         self._lost = 0
+        self._publishers, self._counted = 0, -COUNTED_EVERY  # how many, and when [s]
         self._mismatch = ''
         self._timer = entities.timer(FIRST_WORD, self._remind)
 
@@ -91,10 +93,11 @@ class InputWatch:
         :param take: called with each; not with one whose stamp alone runs far ahead.
         :param profile: quality of service; no deadline, for a publisher that offers none would
             then not be heard at all.
-        :return: takes what comes another way, as if it had come as a message.
+        :return: takes what a watch in this process has let through.
         """
         jumps: ForwardJumps[S] = ForwardJumps()
         self._far = lambda: jumps.refused
+        fresh = self._fresh.heard
 
         def heard(item: S, tag: str) -> None:
             self._wall = now = time.monotonic()
@@ -103,8 +106,17 @@ class InputWatch:
             if tag != self._tag:
                 self._tag = plain(tag, NAME)
             for admitted in jumps.admit(item.stamp, item, now):
-                self._fresh.heard(admitted.stamp, now)
+                fresh(admitted.stamp, now)
                 take(admitted, self._tag)
+
+        def handed(item: S, tag: str) -> None:
+            self._wall = now = time.monotonic()
+            if self._simulated:
+                self._ros = self._clock.now().nanoseconds
+            if tag != self._tag:
+                self._tag = plain(tag, NAME)
+            fresh(item.stamp, now)
+            take(item, self._tag)
 
         def arrived(data: bytes) -> None:
             found = read(bytes(data))
@@ -115,7 +127,7 @@ class InputWatch:
             incompatible_qos=self._incompatible, message_lost=self._count_lost
         )
         self._entities.subscription(kind, self._topic, arrived, profile, events, raw=True)
-        return heard
+        return handed
 
     @property
     def age(self) -> float:
@@ -166,8 +178,11 @@ class InputWatch:
 
     @property
     def publishers(self) -> int:
-        """Number of publishers of the input."""
-        return self._node.count_publishers(self._topic)
+        """Number of publishers of the input, as of lately: to ask the graph is costly."""
+        now = time.monotonic()
+        if now - self._counted > COUNTED_EVERY:
+            self._publishers, self._counted = self._node.count_publishers(self._topic), now
+        return self._publishers
 
     @property
     def problem(self) -> str:

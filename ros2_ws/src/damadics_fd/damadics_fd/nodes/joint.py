@@ -11,6 +11,7 @@ from collections.abc import Callable
 
 from damadics_fd.core.approximator.state import Estimate
 from damadics_fd.core.judgement import Judgement
+from damadics_fd.ros.rounds import Rounds
 
 MOST_ECHOES = 100_000  # as many as the queue of samples holds
 
@@ -80,10 +81,11 @@ class Joint:
 
 
 class Joints:
-    """The joints of a process, by topic."""
+    """The joints of a process, by topic, and the rounds of its nodes."""
 
     def __init__(self) -> None:
         self._joints: dict[str, Joint] = {}
+        self.rounds = Rounds()
 
     def at(self, topic: str) -> Joint:
         """

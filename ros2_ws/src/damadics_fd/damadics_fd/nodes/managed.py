@@ -19,6 +19,7 @@ from damadics_fd.ros.entities import Entities
 from damadics_fd.ros.freshness import default_max_age
 from damadics_fd.ros.parameter_files import files_of, says_nothing
 from damadics_fd.ros.parameters import Parameters, declare_settings
+from damadics_fd.ros.rounds import Rounds
 from damadics_fd.ros.spin import SpinnableNode, StartError
 from damadics_fd.store.slots import check_folder
 
@@ -42,6 +43,7 @@ class MonitoringNode(LifecycleNode, SpinnableNode, ABC):
 
     watch: InputWatch
     diagnostics: Diagnostics
+    rounds: Rounds | None = None  # of the process, where other nodes share it
 
     def __init__(
         self, name: str, topic: str, command: str, arguments: list[str] | None = None
@@ -51,7 +53,7 @@ class MonitoringNode(LifecycleNode, SpinnableNode, ABC):
         self.finished = False
         self.exit_code = 0
         self.active = False
-        self.entities = Entities(self)
+        self.entities = Entities(self, self.rounds)
         self._input = topic, command
         self._cause = ''  # why it could not be configured
         self.parameters = Parameters(self)
@@ -126,7 +128,7 @@ class MonitoringNode(LifecycleNode, SpinnableNode, ABC):
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Make what the node needs."""
-        self.entities = Entities(self)
+        self.entities = Entities(self, self.rounds)
         try:
             period = 1.0 / self.settings.sample_rate
             self.watch = InputWatch(self, self.entities, *self._input, self._timeout, period)

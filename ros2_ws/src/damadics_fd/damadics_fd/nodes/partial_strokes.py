@@ -72,7 +72,7 @@ class PartialStrokes:
         self._blind = blind
         self._estimate: Estimate | None = None
         self._strokes: Strokes | None = None
-        self._message = StrokeRequest()
+        self._message, self._tag = StrokeRequest(), ''
         self._publisher = entities.publisher(StrokeRequest, 'stroke_request', qos.COMMANDS)
         entities.service(PartialStroke, 'partial_stroke', self._serve)
         entities.on_release(lambda: self.end('the monitor was stopped'))
@@ -84,8 +84,7 @@ class PartialStrokes:
         :param estimate: the newest.
         :param frame_id: tag of the actuator.
         """
-        self._estimate = estimate
-        self._message.header.frame_id = frame_id
+        self._estimate, self._tag = estimate, frame_id
         strokes = self._strokes
         if strokes is None:
             return
@@ -189,6 +188,7 @@ class PartialStrokes:
 
     def _send(self, amplitude: float, count: int) -> None:
         message = self._message
+        message.header.frame_id = self._tag
         message.amplitude, message.count = amplitude, count
         set_stamp(message.header.stamp, self._estimate.stamp if self._estimate else 0)
         self._publisher.publish(message)

@@ -5,14 +5,11 @@
 from collections.abc import Callable, Mapping
 from enum import IntEnum
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from rclpy.node import Node
 
 from damadics_fd.core.text import SENTENCE, plain
-from damadics_fd.ros import qos
 from damadics_fd.ros.entities import Entities
-
-PERIOD = 1.0  # s of wall time
 
 
 class Level(IntEnum):
@@ -40,28 +37,26 @@ class Diagnostics:
     def __init__(
         self, node: Node, entities: Entities, hardware_id: str, report: Callable[[], Report]
     ) -> None:
-        self._node = node
         self._name = f'{node.get_fully_qualified_name().lstrip("/")}: {hardware_id}'
         self._hardware_id = hardware_id
         self._report = report
         self._level: Level | None = None
-        self._publisher = entities.publisher(DiagnosticArray, '/diagnostics', qos.DIAGNOSTICS)
-        entities.timer(PERIOD, self.publish)
+        self._board = entities.board(self._status)
 
     def publish(self) -> None:
         """Publish the present status."""
+        self._board.publish([self._status()])
+
+    def _status(self) -> DiagnosticStatus:
         level, message, values = self._report()
         self._level = level
-        status = DiagnosticStatus(
+        return DiagnosticStatus(
             level=bytes([level]),
             name=self._name,
             message=plain(message, SENTENCE),
             hardware_id=self._hardware_id,
             values=[KeyValue(key=key, value=_text(value)) for key, value in values.items()],
         )
-        array = DiagnosticArray(status=[status])
-        array.header.stamp = self._node.get_clock().now().to_msg()
-        self._publisher.publish(array)
 
     def check(self) -> None:
         """Publish at once if the level has changed since the last message."""

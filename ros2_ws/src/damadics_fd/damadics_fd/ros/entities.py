@@ -3,8 +3,9 @@
 """What a node has made: made together, released together; an error in a callback ends nothing."""
 
 from collections.abc import Callable
-from typing import TypeVar
+from typing import ParamSpec, TypeVar
 
+from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
@@ -12,12 +13,17 @@ from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from rclpy.timer import Timer
 
+from damadics_fd.ros.rounds import Rounds
+from damadics_fd.ros.status_board import StatusBoard
+
 REQUESTS = QoSProfile(depth=1000)  # that may wait for their answer
 TOLD_EVERY = 10.0  # s
 
 M = TypeVar('M')
+P = ParamSpec('P')
 Request = TypeVar('Request')
 Response = TypeVar('Response')
+Result = TypeVar('Result')
 
 
 class Entities:
@@ -29,10 +35,12 @@ class Entities:
     was queued when its entity was released does nothing.
 
     :param node: the node.
+    :param rounds: of the process, where many nodes share one.
     """
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: Node, rounds: Rounds | None = None) -> None:
         self._node = node
+        self._rounds = rounds or Rounds()
         self._failing: dict[str, str] = {}
         self._undo: list[Callable[[], object]] = []
         self._alive = True
@@ -90,7 +98,7 @@ class Entities:
         )
         self._undo.append(lambda: self._node.destroy_subscription(made))
 
-    def contained(self, name: str, take: Callable[[M], None]) -> Callable[[M], None]:
+    def contained(self, name: str, take: Callable[P, None]) -> Callable[P, None]:
         """
         Contain the errors of a callback, as those of a subscription.
 
@@ -99,10 +107,10 @@ class Entities:
         :return: what may be called in its place at any time.
         """
 
-        def taken(message: M) -> None:
+        def taken(*given: P.args, **named: P.kwargs) -> None:
             if self._alive:
                 try:
-                    take(message)
+                    take(*given, **named)
                 except Exception as error:
                     self._failed(name, error)
                 else:
@@ -148,22 +156,48 @@ class Entities:
         :param act: called without arguments.
         :return: the timer.
         """
-
-        def acted() -> None:
-            if self._alive:
-                try:
-                    act()
-                except Exception as error:
-                    self._failed(name, error)
-                else:
-                    self._failing.pop(name, None)
-
-        name = f'timer {act.__qualname__}'
         made = self._node.create_timer(
-            period, acted, clock=Clock(clock_type=ClockType.STEADY_TIME)
+            period, self._acting(act), clock=Clock(clock_type=ClockType.STEADY_TIME)
         )
         self._undo.append(lambda: self._node.destroy_timer(made))
         return made
+
+    def every(self, period: float, act: Callable[[], object]) -> None:
+        """
+        Have something done again and again, as by `timer`; the nodes of a process share one.
+
+        :param period: of its calls [s].
+        :param act: called without arguments.
+        """
+        self._undo.append(self._rounds.at(period).join(self._node, self._acting(act)))
+
+    def board(self, status: Callable[[], DiagnosticStatus]) -> StatusBoard:
+        """
+        Have a status published once a second of wall time, with those of the whole process.
+
+        :param status: returns the present one.
+        :return: publishes it at once.
+        """
+        told = self._acting(status)
+        self._undo.append(self._rounds.board.join(self._node, told))
+        return self._rounds.board
+
+    def _acting(self, act: Callable[[], Result]) -> Callable[[], Result | None]:
+        """Contain the errors of what is called again and again."""
+        name = f'timer {act.__qualname__}'
+
+        def acted() -> Result | None:
+            if not self._alive:
+                return None
+            try:
+                result = act()
+            except Exception as error:
+                self._failed(name, error)
+                return None
+            self._failing.pop(name, None)
+            return result
+
+        return acted
 
     def release(self) -> None:
         """Destroy all that was made; what is still queued for it does nothing."""

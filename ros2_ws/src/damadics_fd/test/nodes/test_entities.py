@@ -6,8 +6,11 @@ import time
 
 import pytest
 import rclpy
-from damadics_fd.ros import own_services
+from damadics_fd.ros import own_services, status_board
+from damadics_fd.ros.diagnostics import Diagnostics, Level
 from damadics_fd.ros.entities import Entities
+from damadics_fd.ros.rounds import Rounds
+from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from rclpy.context import Context
@@ -42,6 +45,55 @@ def node(monkeypatch):
     executor.shutdown()
     node.destroy_node()
     context.try_shutdown()
+
+
+def test_nodes_of_a_process_share_one_timer_and_go_on_without_each_other(node):
+    rounds, calls = Rounds(), []
+    one, other = Entities(node, rounds), Entities(node, rounds)
+
+    def fails():
+        calls.append('one')
+        raise ValueError('not now')
+
+    one.every(0.01, fails)
+    other.every(0.01, lambda: calls.append('other'))
+    assert len(list(node.timers)) == 1
+    assert node.wait(lambda: calls.count('other') >= 2)
+    assert one.problem and not other.problem
+    one.release()  # whose timer it was
+    calls.clear()
+    assert node.wait(lambda: calls.count('other') >= 2)
+    assert 'one' not in calls
+    other.release()
+    assert not list(node.timers)
+
+
+def test_nodes_of_a_process_tell_their_health_in_one_message(node, monkeypatch):
+    monkeypatch.setattr(status_board, 'PERIOD', 0.02)
+    rounds, heard = Rounds(), []
+    node.create_subscription(DiagnosticArray, '/diagnostics', heard.append, 100)
+
+    def fails():
+        raise ValueError('not now')
+
+    members = [Entities(node, rounds) for _ in range(3)]
+    reports = [lambda: (Level.OK, 'well', {}), fails, lambda: (Level.WARN, 'not so well', {})]
+    told = [
+        Diagnostics(node, entities, f'LV-{n}', report)
+        for n, (entities, report) in enumerate(zip(members, reports, strict=True))
+    ]
+
+    def last():
+        return [status.message for status in heard[-1].status] if heard else None
+
+    assert node.wait(lambda: last() == ['well', 'not so well'])
+    assert members[1].problem and not members[0].problem
+    assert len(list(node.publishers)) == len({p.topic_name for p in node.publishers})
+    told[2].publish()  # at once, alone
+    assert node.wait(lambda: ['not so well'] in [[s.message for s in m.status] for m in heard])
+    members[0].release()  # whose publisher it was
+    heard.clear()
+    assert node.wait(lambda: last() == ['not so well'])
 
 
 def test_a_timer_that_fails_goes_on_and_is_told(node):

@@ -10,6 +10,7 @@ from damadics_fd.nodes.joint import Joints, Taker
 from damadics_fd.ros.raw import (
     Encoder,
     EstimateEncoder,
+    SampleReader,
     any_estimate,
     any_sample,
     stamp_of,
@@ -50,6 +51,22 @@ def test_stamp_and_tag_are_read_from_bytes(tag):
     estimate = Estimate(header=message.header)
     assert stamp_of(serialize_message(estimate)) == 3_000_000_004
     assert stamp_of(b'\0\1\0\0\1') is None
+
+
+def test_samples_are_read_alike_whatever_came_before():
+    read = SampleReader()
+    for number, tag in enumerate(['LV-1', 'LV-1', 'LV-2', '', '', 'Ventil für Öl', 'LV-1']):
+        message = Measurement(cv=0.1, x1=0.2 * number, ps=-1.0)
+        message.header.frame_id = tag
+        message.header.stamp.sec, message.header.stamp.nanosec = -3, number
+        data = serialize_message(message)
+        assert read(data) == any_sample(data)
+        assert read(data) == any_sample(data)
+        turned = b'\0\0' + data[2:4] + bytes(len(data))  # big-endian, all zero
+        assert read(turned) == any_sample(turned)
+        for cut in (data[:-1], data[:20], data[:3]):
+            with pytest.raises((ValueError, RuntimeError)):
+                read(cut)
 
 
 @pytest.mark.parametrize('tag', ['', 'LV', 'LV-101', 'Ventil für Öl'])
