@@ -33,11 +33,12 @@ def alarms_of(t: Floats, ratio: Floats) -> list[Alarm]:
 
     :param t: instants, ascending, s.
     :param ratio: statistic over limit; 1 raises.
-    :return: alarms; what comes again within CLEAR_S is the same one.
+    :return: alarms; what comes again within CLEAR_S is the same one, and so is what stands at
+        the last sample before a gap in the record and at the first one after it.
     """
-    high = t[ratio >= 1.0]
+    high = np.flatnonzero(ratio >= 1.0)
     if not high.size:
         return []
-    breaks = np.flatnonzero(np.diff(high) > CLEAR_S) + 1
-    groups = np.split(high, breaks)
+    quiet = (np.diff(high) > 1) & (np.diff(t[high]) > CLEAR_S)
+    groups = np.split(t[high], np.flatnonzero(quiet) + 1)
     return [Alarm(float(group[0]), float(group[-1])) for group in groups]

@@ -20,6 +20,8 @@ from damadics_evaluate.detectors.own import RefusedError
 MARGIN = 1.5
 """Limit of a baseline over its largest value on the fault-free part."""
 GAP_S = 30.0
+APART_S = 3600.0
+"""Between a fault-free record and another one that is judged by it, s."""
 NAMED_AFTER_S = 60.0
 FEWEST = 100
 """Samples that a detector learns from at least."""
@@ -93,6 +95,8 @@ def filled(rows: Floats) -> Floats:
 def _monitor(learning: Columns, record: Columns) -> list[Alarm]:
     """Run mode scada as a user's replay does: it learns first, then raises alarms."""
     whole = learning_first(learning, record)
+    later = max(int(NANOSECONDS) - int(whole['stamp'][0]), 0)  # no stamp is before 0
+    whole['stamp'] = whole['stamp'] + later
     length = (learning['stamp'][-1] - learning['stamp'][0]) / NANOSECONDS + 1.0
     settings = Settings.for_mode('scada', t_learn=float(round(length)), latch=False)
     result = run(whole, settings)
@@ -100,9 +104,14 @@ def _monitor(learning: Columns, record: Columns) -> list[Alarm]:
         raise ValueError('mode scada is not there')
     if result.estimator.monitor.reference is None:
         raise ValueError(f'mode scada does not arm: {result.estimator.status}')
-    high = np.where(result.accepted, result.decisions['fault'] != 0, False)
-    alarms = alarms_of(whole['stamp'] / NANOSECONDS, high.astype(np.float64))
-    return _with_causes(whole, settings, alarms)
+    judged = result.accepted  # a sample that is refused neither raises an alarm nor ends one
+    high = result.decisions['fault'][judged] != 0
+    alarms = alarms_of(whole['stamp'][judged] / NANOSECONDS, high.astype(np.float64))
+    seconds = later / NANOSECONDS
+    return [
+        replace(a, start=a.start - seconds, end=a.end - seconds)
+        for a in _with_causes(whole, settings, alarms)
+    ]
 
 
 def learning_first(learning: Columns, record: Columns) -> Columns:
@@ -110,7 +119,7 @@ def learning_first(learning: Columns, record: Columns) -> Columns:
     Return a record that begins with its fault-free part.
 
     Where that part lies within, what comes before it is left out; where it is of another record,
-    its stamps are moved to just before this one.
+    its stamps are moved to an hour before this one: the valve is not where that record left it.
     """
     first, last = learning['stamp'][0], learning['stamp'][-1]
     names = learning.keys() & record.keys()
@@ -120,7 +129,7 @@ def learning_first(learning: Columns, record: Columns) -> Columns:
         rest = {name: record[name][stamp > last] for name in names}
     else:
         rest = {name: record[name] for name in names}
-        early['stamp'] = learning['stamp'] + (stamp[0] - last - int(NANOSECONDS))
+        early['stamp'] = learning['stamp'] + (stamp[0] - last - int(APART_S * NANOSECONDS))
     return {name: np.concatenate((early[name], rest[name])) for name in names}
 
 

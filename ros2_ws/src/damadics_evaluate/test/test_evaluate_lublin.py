@@ -14,6 +14,7 @@ from damadics_evaluate.alarms import Alarm, alarms_of
 from damadics_evaluate.lublin.files import date_of, read_folder
 from damadics_evaluate.lublin.judge import false_alarms, outcomes
 from damadics_evaluate.lublin.schedule import SCHEDULE, Induced, events_of
+from damadics_evaluate.watching import watch
 
 SHARED = Path(__file__).resolve().parents[5] / 'shared' / 'data'
 REAL = SHARED / 'lublin_2001-11-17_1hz.csv'
@@ -80,6 +81,18 @@ def test_what_comes_again_within_half_a_minute_is_the_same_alarm():
     ratio = np.zeros(200)
     ratio[[10, 11, 41, 80]] = 1.0
     assert [(a.start, a.end) for a in alarms_of(t, ratio)] == [(10, 41), (80, 80)]
+
+
+def test_an_alarm_that_stands_over_a_gap_is_one():
+    """As a person sees it: nothing was raised by the first sample after a gap."""
+    t = np.r_[np.arange(100.0), np.arange(740.0, 900.0)]
+    ratio = np.zeros(len(t))
+    ratio[(t >= 90) & (t <= 749)] = 1.0
+    alarms = alarms_of(t, ratio)
+    assert [(a.start, a.end) for a in alarms] == [(90, 749)]
+    assert not false_alarms([Induced(1, 1, DAY, 88.0, 95.0, 'f16')], alarms, 0.0, 900.0)
+    ratio[t == 740] = 0.0  # here it is seen to be gone, and comes again
+    assert [(a.start, a.end) for a in alarms_of(t, ratio)] == [(90, 99), (741, 749)]
 
 
 def test_dates_in_file_names():
@@ -176,3 +189,37 @@ def test_the_real_plant(tmp_path):
     assert [t_dt[i] for i in (6, 8, 9, 17, 18)] == ['9', '5', '2', '4', '5']
     assert t_dt[5] == ''  # f18 is found only after its end
     assert sum(r['kind'] == 'absent' for r in lines) == 9
+
+
+@pytest.mark.parametrize('zero', [0.0, 50000.0])
+def test_a_record_that_another_one_was_learned_for(zero):
+    """The valve stands elsewhere at its start, which is no jump; stamps may begin at 0."""
+    rng = np.random.default_rng(5)
+
+    def columns(start, n, cv):
+        noise = rng.normal(0.0, 0.002, n)
+        stamp = ((start + np.arange(n)) * 1e9).astype(np.int64)
+        return {'stamp': stamp, 'cv': cv, 'x1': np.r_[cv[:1], cv[:-1]] + noise}
+
+    t = np.arange(900.0)
+    learning = columns(70000.0, 900, 0.5 + 0.2 * np.sin(t / 20.0))
+    record = columns(zero, 900, 0.5 - 0.2 * np.cos(t / 20.0))
+    assert watch('scada', learning, record, zero) == []
+    record['x1'][700:] = record['x1'][700]
+    alarms = watch('scada', learning, record, zero)
+    assert [zero + 700.0 <= a.start <= zero + 730.0 for a in alarms] == [True]
+
+
+@pytest.mark.skipif(not REAL.exists(), reason=f'no {REAL.name} beside the repository')
+@pytest.mark.parametrize('step', [1, -1])
+def test_mode_scada_raises_nothing_false_on_the_real_plant(tmp_path, step):
+    """Also where the parts of the day come in another order, as parts of files do."""
+    parts = REAL.read_text().splitlines(keepends=True)
+    for i, part in enumerate(([parts[0], *parts[1:2000]], [parts[0], *parts[2000:]])[::step]):
+        (tmp_path / f'part{i}_2001-11-17.csv').write_text(''.join(part))
+    lines = run(tmp_path, tmp_path, '--detectors', 'scada', '--learn', '52880-53780')
+    t_dt = {int(r['item']): r['t_dt'] for r in lines if r['kind'] == 'event'}
+    latest = {5: 5.0, 6: 9.0, 8: 5.0, 9: 2.0, 17: 4.0, 18: 5.0, 19: 30.0}  # FIR + CUSUM, or sooner
+    assert set(t_dt) == set(latest)
+    assert [i for i, value in t_dt.items() if not -10.0 <= float(value) <= latest[i]] == []
+    assert [r['start'] for r in lines if r['kind'] == 'false alarm'] == []

@@ -47,3 +47,14 @@ def driven(seconds: int, seed: int, at: int = 1 << 30, **faults: float) -> np.nd
     noisy = clean + rng.normal(0.0, NOISE, clean.shape)
     noisy[:, -1] = np.clip(noisy[:, -1], 0.0, 1.0)  # the meter's range
     return np.column_stack([t, cv, noisy])
+
+
+def following(n: int, seed: int) -> np.ndarray:
+    """Return rows of a stem that follows its command two seconds later; nothing else is known."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(float(n))
+    cv = 0.5 + 0.2 * np.sin(2 * np.pi * 0.015 * t) + 0.1 * np.sin(2 * np.pi * 0.004 * t)
+    rows = np.full((n, 7), np.nan)
+    rows[:, 0], rows[:, 1] = t, cv
+    rows[:, 2] = np.r_[cv[:1], cv[:1], cv[:-2]] + rng.normal(0.0, NOISE, n)
+    return rows

@@ -25,8 +25,10 @@ from damadics_fd.core.scada.naming.isolation import misfit
 from damadics_fd.core.scada.state import LAW, NOMINAL, Reference
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.settings.identified import LIMITED, REFUSED, FaultFree
+from damadics_fd.store import references as kept
+from damadics_fd.store.references import load_reference, save_reference
 
-from .driven import SETTINGS, driven
+from .driven import SETTINGS, driven, following
 
 pytestmark = pytest.mark.plain
 T, CV, X, P1, P2, T1, F = range(7)
@@ -44,17 +46,6 @@ def reference():
 def followed():
     """Learn a valve of which CV and position alone are measured."""
     return learn(following(400, seed=2), SETTINGS, math.inf)
-
-
-def following(n: int, seed: int) -> np.ndarray:
-    """Return rows of a stem that follows its command two seconds later; nothing else is known."""
-    rng = np.random.default_rng(seed)
-    t = np.arange(float(n))
-    cv = 0.5 + 0.2 * np.sin(2 * np.pi * 0.015 * t) + 0.1 * np.sin(2 * np.pi * 0.004 * t)
-    rows = np.full((n, 7), math.nan)
-    rows[:, T], rows[:, CV] = t, cv
-    rows[:, X] = np.r_[cv[:1], cv[:1], cv[:-2]] + rng.normal(0.0, 0.0014, n)
-    return rows
 
 
 def columns(rows: np.ndarray) -> dict[str, np.ndarray]:
@@ -266,6 +257,31 @@ def test_valves_in_a_bank_are_moved_learned_and_relearned(reference):
         other.restore_bytes(0, seen[:-8])
     other.reset(1)
     assert other.counters(1)['accepted'] == 0
+
+
+# what version 0.1 kept of a valve in this mode
+FIELDS_OF_0_1 = (
+    *('hold', 'cv_jump', 'w', 'dp_mean', 'g0', 'g1', 'mu', 'sd', 'k', 'h', 'clip', 's1', 'kap2'),
+    *('llr_limit', 'n', 'pressure_a', 'pressure_c', 'pressure_sigma', 'pressure_mean'),
+    *('pressure_b', 'pressure_b0'),
+)
+
+
+@pytest.mark.parametrize('change', ['0.1', 'less', 'more'])
+def test_a_reference_of_another_version_is_refused_with_what_to_do(reference, change, tmp_path):
+    learned = Reference.plain(reference)
+    if change == '0.1':
+        learned = dict.fromkeys(FIELDS_OF_0_1, 1.0)
+    elif change == 'less':
+        del learned['period']
+    else:
+        learned['later'] = 1.0
+    file = tmp_path / 'LC74'
+    save_reference(file, kept.Reference('LC74', learned, MODE.to_dict()))
+    chain = Chain(MODE)
+    with pytest.raises(ValueError, match='another version.*learn anew.*commission --mode scada'):
+        chain.restore(load_reference(file, 'LC74', MODE).learned)
+    assert chain.status == 'waiting for the first good sample'
 
 
 @pytest.mark.parametrize(

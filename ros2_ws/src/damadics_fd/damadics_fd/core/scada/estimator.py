@@ -253,6 +253,11 @@ class ScadaEstimator(Intake):
         :param learned: what was learned.
         :raises ValueError: where it is not that; the monitor is then untouched.
         """
+        if learned.keys() != Reference.plain(Reference.rows()).keys():
+            raise ValueError(
+                'learned state: it is damaged or of another version of mode scada: learn anew, '
+                'live or by commission --mode scada RECORDING'
+            )
         reference = Reference.read(learned, 'learned state')
         if not (reference['s1'] > 0.0).all() or not (reference['llr_limit'] > 0.0).all():
             raise ValueError('learned state: s1 and llr_limit must be positive')

@@ -99,6 +99,9 @@ class MonitorState(Record):
     t_raw: float  # last sample seen, accepted or thinned out
     t_test: float  # no test before
     t_stem: float  # no test of r1 before
+    t_flow: float  # no test of r2 before
+    t_lagged: float  # when the flow that the meter lags behind was known last
+    blind: int  # samples in a row without a pressure
     filled: int  # pressure samples since the last restart
     past: Annotated[Floats, 2, TAPS]
     p_hat: Annotated[Floats, 2]
@@ -112,6 +115,7 @@ class MonitorState(Record):
     repeats: int  # samples in a row that are the one before
     size: float
     f_lagged: float
+    f_slow: float  # the same behind a meter as slow as meters are
     top_flow: float  # largest so far, and how often: a meter at its end shows it again and again
     top_count: int
     drift: Annotated[Floats, 2]  # of stem (share of stroke) and flow (log) since learning

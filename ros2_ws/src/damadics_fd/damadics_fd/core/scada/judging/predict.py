@@ -5,7 +5,13 @@
 import math
 
 from damadics_fd.core.jit import jit
-from damadics_fd.core.scada.judging.decide import silence
+from damadics_fd.core.scada.judging.gap import (
+    GAP_PERIODS,
+    SETTLING_PERIODS,
+    begin_again,
+    bridge,
+    restart,
+)
 from damadics_fd.core.scada.judging.pressure import (
     GATE,
     TAPS,
@@ -16,53 +22,17 @@ from damadics_fd.core.scada.judging.pressure import (
 )
 from damadics_fd.core.scada.laws.actuator import nominal_flow
 from damadics_fd.core.scada.laws.flow_law import characteristic, sizing
-from damadics_fd.core.scada.laws.stem_law import advance_track, position, start_track
-from damadics_fd.core.scada.model import advance_stem, copy_stem, start_stem
+from damadics_fd.core.scada.laws.stem_law import advance_track, position
+from damadics_fd.core.scada.model import advance_stem, copy_stem
 from damadics_fd.core.scada.settings import ScadaConfig
 from damadics_fd.core.scada.state import HISTORY_LENGTH, LAW, MonitorState, Reference
 
-FORGET_S = 300.0
-SETTLING_PERIODS = 10.0
 OTHER_PERIOD = 1.6  # factor between two sample periods that are not the same
 STRANGE = 20  # samples in a row
+SLOW_METER_S = 5.0  # a record in which the flow hardly moves does not tell the meter's lag
 METER_LAGS = 3.0  # after a gap, until a flow meter shows the flow
 COPIES = 2  # rows in a row that may be copies
-GAP_PERIODS = 5.0  # sample periods without a sample that are no gap yet
-
-
-@jit
-def restart(
-    s: MonitorState,
-    cfg: ScadaConfig,
-    ref: Reference,
-    t: float,
-    cv: float,
-    x: float,
-    p1: float,
-    p2: float,
-) -> None:
-    """Start the models and the pressure filter at this sample."""
-    start_track(s.track, t, cv)
-    if ref.stem_kind == LAW:
-        s.track.lagged[:] = (x - ref.stem_law.offset) / ref.stem_law.gain
-        s.track.held[:] = s.track.lagged[0]
-    s.f_lagged = math.nan
-    start_stem(s.stem[0], cfg.act, t)
-    copy_stem(s.stem[0], s.stem[1])
-    s.fault[1].f4 = cfg.wide_play - cfg.act.stem_play
-    s.filled = 0
-    s.steady = 0
-    for i in range(4):
-        s.cv[i] = cv
-    s.dp[0] = p1 - p2
-    s.dp[1] = p1 - p2
-    s.xm[:] = 0.0
-    s.xd = 0.0
-    for i in range(TAPS):
-        s.past[0, i] = p1
-        s.past[1, i] = p2
-    s.p_hat[0] = p1
-    s.p_hat[1] = p2
+BLIND = 2  # samples without a pressure that the stated stem is carried over
 
 
 @jit
@@ -103,16 +73,6 @@ def repeated(s: MonitorState) -> bool:
 
 
 @jit
-def settling(cfg: ScadaConfig, ref: Reference) -> float:
-    """Return how long the models take from a start at the measured position, s."""
-    if ref.stem_kind != LAW:
-        value: float = cfg.settle_s
-        return value
-    law = ref.stem_law
-    return min(cfg.settle_s, law.dead_s + 5.0 * law.lag_s + SETTLING_PERIODS * ref.period)
-
-
-@jit
 def filter_pressures(s: MonitorState, ref: Reference, p1: float, p2: float) -> None:
     """Fuse each pressure with its prediction; do not believe a single value far from it."""
     s.innovation[:] = math.nan
@@ -120,6 +80,11 @@ def filter_pressures(s: MonitorState, ref: Reference, p1: float, p2: float) -> N
         measured = p1 if i == 0 else p2
         filt = ref.pressure[i]
         kept = measured
+        if math.isnan(measured):  # what comes after it is no continuation of what was before
+            s.past[i, :] = math.nan
+        elif math.isnan(s.past[i, 0]):
+            s.past[i, :] = measured
+            s.steady = 1
         if math.isnan(measured) or s.filled < TAPS or not filt.sigma > 0.0:
             s.p_hat[i] = measured
             s.doubtful[i] = 0
@@ -164,20 +129,14 @@ def predict(
     if s.samples == 0:
         s.t_first = t
         s.t_test = t + cfg.t_on_s
+        s.t_lagged = t
+        s.level[:] = math.nan
         restart(s, cfg, ref, t, cv, x, p1, p2)
     elif t - s.t > max(cfg.gap_s, GAP_PERIODS * ref.period):
-        if ref.stem_kind == LAW:  # it starts at the measured position: only r1 has to wait
-            s.t_stem = max(s.t_stem, t + settling(cfg, ref))
-            silence(s)
-        else:
-            s.t_test = max(s.t_test, t + settling(cfg, ref))
-        if ref.flow_kind == LAW:
-            s.t_test = max(s.t_test, t + METER_LAGS * ref.flow_law.lag_s)
-        if t - s.t > FORGET_S:  # what stood then is not known now: new evidence decides
-            s.stands[:] = 0
-            s.stood = False
-            s.t_gone = t
+        begin_again(s, cfg, ref, t)
         restart(s, cfg, ref, t, cv, x, p1, p2)
+    elif ref.regular and t - s.t > GAP_PERIODS * max(cfg.period_s, ref.period):
+        bridge(s, ref, t)
     watch_period(s, cfg, ref, t)
     entry = s.history[s.samples % HISTORY_LENGTH]
     t0 = s.t if s.filled > 0 else t
@@ -195,6 +154,11 @@ def predict(
     z2 = s.dp[1]
     z1 = s.dp[0]
     z0 = s.p_hat[0] - s.p_hat[1]
+    s.blind = s.blind + 1 if math.isnan(z0) else 0
+    if s.blind > 0:
+        z0 = z1
+    if s.blind > BLIND and not law:
+        s.t_stem = max(s.t_stem, t + SETTLING_PERIODS * ref.period)
     s.dp[1] = z1
     s.dp[0] = z0
     for i in range(3, 0, -1):
@@ -214,7 +178,9 @@ def predict(
     elif s.filled > 0:
         dt = t - t0
         regular = s.filled >= 2 and dt < 1.5 * period
-        if regular:
+        if s.blind > 0:
+            pass  # the drop stays what it was
+        elif regular:
             following = predict_pressure(ref.pressure[0], s.past[0])
             following -= predict_pressure(ref.pressure[1], s.past[1])
             slope0 = (z0 - z2) / (2.0 * dt)
@@ -243,7 +209,7 @@ def predict(
     s.phi[9] = z0 - ref.dp_mean
     s.phi[10] = z1 - ref.dp_mean
     if ref.flow_kind == LAW:
-        predict_by_law(s, ref, x, p1, p2, t1, flow, t - t0)
+        predict_by_law(s, ref, t, x, p1, p2, t1, flow)
     else:
         predict_flow(s, cfg, ref, x, t1, flow)
     entry.t0 = t0
@@ -273,10 +239,10 @@ def predict_flow(
     s.f_model = math.nan
     s.sq = 1.0
     s.masked = True
-    if math.isnan(t1) or math.isnan(flow):
-        return
     p1 = s.p_hat[0]
     p2 = s.p_hat[1]
+    if math.isnan(p1 + p2 + t1 + flow):
+        return
     s.f = nominal_flow(cfg.act, x, p1, p2, t1)
     fx = (
         nominal_flow(cfg.act, x + 0.002, p1, p2, t1) - nominal_flow(cfg.act, x - 0.002, p1, p2, t1)
@@ -293,12 +259,12 @@ def predict_flow(
 def predict_by_law(
     s: MonitorState,
     ref: Reference,
+    t: float,
     x: float,
     p1: float,
     p2: float,
     t1: float,
     flow: float,
-    dt: float,
 ) -> None:
     """Predict F' by the flow law; sigma is that of the meter and of what the record left."""
     law = ref.flow_law
@@ -311,13 +277,25 @@ def predict_by_law(
     elif flow == s.top_flow:
         s.top_count += 1
     s.size = sizing(law.medium, p1, p2, t1)
-    if math.isnan(x) or math.isnan(s.size) or math.isnan(flow) or math.isinf(s.size):
+    if math.isnan(x) or math.isnan(s.size) or math.isinf(s.size):
         return
     f = math.exp(characteristic(law, x) + s.size)
+    dt = t - s.t_lagged
+    if dt > GAP_PERIODS * ref.period:  # unknown meanwhile: the meter may show what was before
+        s.f_lagged = math.nan
+        s.f_slow = math.nan
+        s.t_flow = max(s.t_flow, t + METER_LAGS * law.lag_s)
     if math.isnan(s.f_lagged) or not law.lag_s > 0.0:
         s.f_lagged = f
     else:
         s.f_lagged += (1.0 - math.exp(-dt / law.lag_s)) * (f - s.f_lagged)
+    if math.isnan(s.f_slow):
+        s.f_slow = f
+    else:
+        s.f_slow += (1.0 - math.exp(-dt / max(law.lag_s, SLOW_METER_S))) * (f - s.f_slow)
+    s.t_lagged = t
+    if math.isnan(flow):
+        return
     s.f = s.f_lagged
     s.sq = math.sqrt(law.noise * law.noise + s.f * s.f * law.spread * law.spread)
     s.masked = False

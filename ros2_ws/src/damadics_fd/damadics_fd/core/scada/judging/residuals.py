@@ -88,7 +88,7 @@ def residuals(
     s.testable[R1] = 1 if s.t >= s.t_stem else 0
     if repeated(s) and ref.stem_kind == LAW:
         s.testable[R1] = 0
-    if repeated(s) and ref.flow_kind == LAW:
+    if (repeated(s) and ref.flow_kind == LAW) or s.t < s.t_flow:
         s.testable[R2] = 0
     s.residual[P1] = s.innovation[0]
     s.residual[P2] = s.innovation[1]
@@ -139,14 +139,14 @@ def flow_residual(s: MonitorState, ref: Reference, x: float, flow: float) -> flo
     if s.masked:
         return math.nan if math.isnan(flow) else 0.0
     hours = FLOW_HOURS * hours_unseen(ref)
-    middle = s.f * math.exp(s.drift[1])
+    drift = math.exp(s.drift[1])
     doubt = flow_doubt(law, x, s.size)
     drifted = abs(slope(law, x) * s.drift[0])  # of the stem, or of its sensor alone
     band = math.exp(DOUBT * math.sqrt(doubt * doubt + hours * hours) + drifted)
     scale = law.range if law.range > 0.0 else ref.flow_max
     floor = 0.005 * scale
-    low = middle / band - floor
-    high = middle * band + floor
+    low = min(s.f, s.f_slow) * drift / band - floor
+    high = max(s.f, s.f_slow) * drift * band + floor
     top = law.range
     if s.top_count >= AGAIN and s.top_flow >= END * ref.flow_max:
         top = min(top, s.top_flow) if top > 0.0 else s.top_flow
@@ -180,7 +180,7 @@ def process_residual(s: MonitorState, ref: Reference, p1: float, p2: float, flow
     if not ref.drop > 0.0 or math.isnan(p1) or math.isnan(p2):
         s.testable[PROCESS] = 0
         return math.nan
-    if s.filled <= 1:
+    if math.isnan(s.level[0]):
         s.level[0] = p1
         s.level[1] = p2
         s.level_flow = flow

@@ -64,6 +64,14 @@ def follow_roughness(s: MonitorState, ref: Reference, flow: float) -> None:
 
 
 @jit
+def break_off(s: MonitorState) -> None:
+    """Take no change over a gap: the next sample, the next block do not follow on the last."""
+    s.rough_last[:] = math.nan
+    s.rough_sum[:] = 0.0
+    s.rough_size[:] = 0
+
+
+@jit
 def take_change(s: MonitorState, ref: Reference, r: int, scale: int, value: float) -> None:
     """Take a change of a residual (scale 0) or of its block mean (scale 1)."""
     change = abs(value - s.rough_last[r, scale])

@@ -158,7 +158,7 @@ def _fit(
         spread = max(spread_of(left), 1e-4)
         weight = huber_weights(left)
     share = effective(left) / len(left)
-    normal = a.T @ (a * weight[:, None])
+    normal = z.T @ (z * weight[:, None])  # the noise in X' tells nothing of the slope
     v = np.linalg.inv(normal * share / spread**2 + precision)
     c = np.minimum.accumulate(c)
     full = np.full(len(x), np.nan)

@@ -1,0 +1,95 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""What a gap leaves: the models start again, the alarm goes on, the evidence is forgotten."""
+
+import math
+
+from damadics_fd.core.jit import jit
+from damadics_fd.core.scada.judging.decide import silence
+from damadics_fd.core.scada.judging.pressure import TAPS
+from damadics_fd.core.scada.judging.roughness import break_off
+from damadics_fd.core.scada.laws.stem_law import start_track
+from damadics_fd.core.scada.model import copy_stem, start_stem
+from damadics_fd.core.scada.settings import ScadaConfig
+from damadics_fd.core.scada.state import LAW, MonitorState, Reference
+
+FORGET_S = 300.0
+SETTLING_PERIODS = 10.0
+GAP_PERIODS = 5.0  # sample periods without a sample that are no gap yet
+
+
+@jit
+def settling(cfg: ScadaConfig, ref: Reference) -> float:
+    """Return how long the models take from a start at the measured position, s."""
+    if ref.stem_kind != LAW:
+        value: float = cfg.settle_s
+        return value
+    law = ref.stem_law
+    return min(cfg.settle_s, law.dead_s + 5.0 * law.lag_s + SETTLING_PERIODS * ref.period)
+
+
+@jit
+def begin_again(s: MonitorState, cfg: ScadaConfig, ref: Reference, t: float) -> None:
+    """
+    Keep what is worth anything after a gap that ends at t: the alarm, not the evidence.
+
+    What stood is taken to stand until it can be told; after a long gap new evidence decides.
+    """
+    silence(s)
+    break_off(s)
+    if ref.stem_kind == LAW:  # it starts at the measured position: only r1 has to wait
+        s.t_stem = max(s.t_stem, t + settling(cfg, ref))
+    else:
+        s.t_test = max(s.t_test, t + settling(cfg, ref))
+    if t - s.t > FORGET_S:
+        s.stands[:] = 0
+        s.stood = False
+        s.t_gone = t
+        s.level[:] = math.nan
+
+
+@jit
+def bridge(s: MonitorState, ref: Reference, t: float) -> None:
+    """Make no test of r1 for a while after t: which way CV went since the last sample is open."""
+    wait = SETTLING_PERIODS * ref.period
+    if ref.stem_kind == LAW:
+        wait = 3.0 * ref.period + ref.stem_law.dead_s + 5.0 * ref.stem_law.lag_s
+    s.t_stem = max(s.t_stem, t + wait)
+    break_off(s)
+
+
+@jit
+def restart(
+    s: MonitorState,
+    cfg: ScadaConfig,
+    ref: Reference,
+    t: float,
+    cv: float,
+    x: float,
+    p1: float,
+    p2: float,
+) -> None:
+    """Start the models and the pressure filter at this sample."""
+    start_track(s.track, t, cv)
+    if ref.stem_kind == LAW:
+        s.track.lagged[:] = (x - ref.stem_law.offset) / ref.stem_law.gain
+        s.track.held[:] = s.track.lagged[0]
+    s.f_lagged = math.nan
+    s.f_slow = math.nan
+    s.last[:] = math.nan
+    start_stem(s.stem[0], cfg.act, t)
+    copy_stem(s.stem[0], s.stem[1])
+    s.fault[1].f4 = cfg.wide_play - cfg.act.stem_play
+    s.filled = 0
+    s.steady = 0
+    for i in range(4):
+        s.cv[i] = cv
+    s.dp[:] = p1 - p2 if math.isfinite(p1 - p2) else ref.dp_mean
+    s.blind = 0
+    s.xm[:] = 0.0
+    s.xd = 0.0
+    for i in range(TAPS):
+        s.past[0, i] = p1
+        s.past[1, i] = p2
+    s.p_hat[0] = p1
+    s.p_hat[1] = p2
