@@ -17,6 +17,8 @@ from rclpy.context import Context
 from rclpy.experimental import EventsExecutor
 from rclpy.qos import QoSProfile
 
+PATIENCE = 60.0  # s for what takes a second or two: a busy machine is no failure
+
 
 class Peer:
     """A node of the test in its own domain: publishes samples, keeps what the nodes publish."""
@@ -36,11 +38,20 @@ class Peer:
         self.node.create_subscription(kind, topic, messages.append, profile)
         return messages
 
-    def wait(self, condition, patience: float = 10.0) -> bool:
+    def wait(self, condition, patience: float = PATIENCE) -> bool:
         deadline = time.monotonic() + patience
         while not condition() and time.monotonic() < deadline:
             self.executor.spin_once(timeout_sec=0.02)
         return bool(condition())
+
+    def call(self, kind, name: str, wait=None, **request):
+        """Call a service and return its answer; `wait`, as of the peer, lets samples go on."""
+        wait = wait or self.wait
+        client = self.node.create_client(kind, name)
+        assert wait(client.service_is_ready), f'{name} is not served'
+        future = client.call_async(kind.Request(**request))
+        assert wait(future.done), f'{name} does not answer'
+        return future.result()
 
     def send(self, stamp: int, cv: float, x1: float, **others: float) -> None:
         message = Measurement(cv=cv, x1=x1, p1=3.5e6, p2=2.6e6, t1=20.0, flow=5.0, ps=1e5)

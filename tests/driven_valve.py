@@ -4,6 +4,7 @@
 
 import time
 
+from conftest import PATIENCE
 from damadics_bringup.processes import parameters
 from damadics_fd.ros import qos
 from damadics_msgs.msg import FaultEvent, FaultFlag
@@ -46,7 +47,7 @@ class Valve:
             self.next = self.stamp
             self.peer.wait(lambda: False, PERIOD * 1e-9)
 
-    def run_until(self, condition, throw: bool = False, patience: float = 15.0) -> bool:
+    def run_until(self, condition, throw: bool = False, patience: float = PATIENCE) -> bool:
         """Send samples until something has come about."""
         deadline = time.monotonic() + patience
         while not condition() and time.monotonic() < deadline:
@@ -61,11 +62,7 @@ class Valve:
 
     def call(self, kind, name: str, **request):
         """Call a service, samples going on."""
-        client = self.peer.node.create_client(kind, name)
-        assert self.run_until(client.service_is_ready), f'{name} is not served'
-        future = client.call_async(kind.Request(**request))
-        assert self.run_until(future.done), f'{name} does not answer'
-        return future.result()
+        return self.peer.call(kind, name, self.run_until, **request)
 
     def report(self, node: str):
         """Return the latest diagnostic status of a node."""
@@ -96,7 +93,15 @@ def start(processes, peer, alarms='auto', **settings) -> Valve:
         parameters(alarm_folder=alarms, allow_partial_stroke=True, **settings),
     )
     valve = Valve(peer)
-    assert peer.wait(lambda: valve.flags, 30.0), 'the detector did not start'
-    assert peer.wait(lambda: peer.node.count_subscribers('/measurement') > 0, 30.0)
-    assert peer.wait(lambda: peer.node.count_publishers('/estimate') > 0, 30.0)
+    wait_until_monitored(peer, valve.flags)
     return valve
+
+
+def wait_until_monitored(peer, flags: list) -> None:
+    """Wait until estimator and detector of the peer's measurement take it and each other."""
+    graph = peer.node
+    assert peer.wait(lambda: flags), 'the detector did not start'
+    assert peer.wait(lambda: graph.count_subscribers('/measurement') > 0)
+    assert peer.wait(
+        lambda: graph.count_publishers('/estimate') and graph.count_subscribers('/estimate')
+    )

@@ -121,15 +121,12 @@ def faulted(first):
     """The same once its friction is flagged."""
     healthy = (FaultFlag.STATE_HEALTHY,)
     assert first.peer.wait(lambda: first.flags and first.flags[-1].state in healthy, 120.0)
-    first.tile.wait(('ok',), 20.0)
+    first.tile.wait(('ok',))
     first.early = rises(first)
-    client = first.peer.node.create_client(InjectFault, f'/{VALVE}/inject_fault')
-    assert first.peer.wait(client.service_is_ready)
-    answer = client.call_async(InjectFault.Request(fault=FRICTION, strength=1.0))
-    assert first.peer.wait(answer.done)
-    assert answer.result().success
+    answer = first.peer.call(InjectFault, f'/{VALVE}/inject_fault', fault=FRICTION, strength=1.0)
+    assert answer.success
     assert first.peer.wait(lambda: first.flags[-1].fault, 30.0), 'the friction is not flagged'
-    first.shown_after = first.tile.wait(website.ALARM, 5.0)
+    first.shown_after = first.tile.wait(website.ALARM)
     assert first.peer.wait(lambda: rises(first))
     return first
 
@@ -140,7 +137,7 @@ def restarted(faulted):
     faulted.occurrence = faulted.flags[-1].occurrence
     run = children(faulted.processes.pid('run'))
     os.kill(next(child.pid for child in run if child.name == 'detector'), signal.SIGKILL)
-    faulted.grey_after = faulted.tile.wait(('off',), 5.0)
+    faulted.grey_after = faulted.tile.wait(('off',))
     faulted.peer.wait(lambda: False, 0.3)
     before = len(faulted.flags)
     faulted.tile.wait(website.ALARM, 60.0)  # `run` has started it again

@@ -120,7 +120,7 @@ def test_from_nothing_to_a_report_on_a_fault(reader, peer, processes, tmp_path):
     assert peer.wait(lambda: peer.node.count_subscribers(f'/{VALVE}/measurement') > 1, 30.0)
     reader.send(RECORDED, FASTER)
     assert peer.wait(lambda: len(taken) >= RECORDED * RATE * 0.9, 30.0)
-    processes.end('recorder', 30.0)
+    processes.end('recorder')
     file = plant / f'{VALVE}.param.yaml'
     said = command('damadics_fd', 'commission', bag, '--actuator', TAG, '--out', file)
     assert 'verdict' in said

@@ -22,6 +22,7 @@ from damadics_bringup.processes import executable, parameters
 from damadics_bringup.respawn import unless_refused
 from damadics_fd.store.fleet_file import FleetError, Valve, read_fleet
 from damadics_msgs import msg
+from permissions import allowed
 
 SHARE = Path(get_package_share_directory('damadics_bringup'))
 LAUNCH = sorted((SHARE / 'launch').glob('*.launch.py'))
@@ -290,7 +291,7 @@ def rights(policy: Path | ET.ElementTree, verb: str) -> dict[str, set[str]]:
     tree = ET.parse(policy) if isinstance(policy, Path) else policy
     for profile in tree.iter('profile'):
         node = f'{profile.get("ns").rstrip("/")}/{profile.get("node")}'
-        found[node] = {e.text.replace('~', node, 1) for e in profile.findall(f'*[@{verb}]/*')}
+        found[node] = allowed(profile, verb)
     return found
 
 

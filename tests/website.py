@@ -13,8 +13,17 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 PICTURES = os.environ.get('DAMADICS_SCREENSHOTS')  # folder to write pictures of the page to
 CHROMIUM = Path('/usr/bin/chromium')
+IN_A_BROWSER = [
+    pytest.mark.ros,
+    pytest.mark.skipif(
+        not CHROMIUM.is_file(),
+        reason='no browser: apt-get install chromium for the tests of the page',
+    ),
+]
 FLAGS = [
     '--no-sandbox',
     '--disable-gpu',
@@ -93,7 +102,7 @@ class Tile:
         with urllib.request.urlopen(f'{self._address}/state', timeout=5.0) as answer:
             return json.load(answer).get(self._valve, '')
 
-    def wait(self, kinds: tuple[str, ...], patience: float) -> float:
+    def wait(self, kinds: tuple[str, ...], patience: float = 60.0) -> float:
         """Wait until the tile is of one of the kinds and return how long that took."""
         began = time.monotonic()
         while (kind := self.kind()) not in kinds:

@@ -12,6 +12,7 @@ import time
 from pathlib import Path
 
 import pytest
+from conftest import PATIENCE
 
 HERE = Path(__file__).parent
 
@@ -23,7 +24,7 @@ def free_port() -> int:
         return probe.getsockname()[1]
 
 
-def wait_for(condition, patience: float = 20.0, pause: float = 0.05) -> bool:
+def wait_for(condition, patience: float = PATIENCE, pause: float = 0.05) -> bool:
     """Wait until something has come true."""
     end = time.monotonic() + patience
     while not condition() and time.monotonic() < end:

@@ -114,7 +114,7 @@ def test_samples_in_json_and_sparkplug(processes, domain, tmp_path, broker):
     hostile = [b'{', b'[1]', b'[' * 100_000, b'\xff', b'{"ts": "x"}', b'{"ts": 1e300}']
     for body in [*hostile, b'{"ts": -1}', b'x' * 10_000_000]:
         plc.publish('plant/lv1', body)
-    assert peer.wait(lambda: 'lv1: 10000000 bytes' in told[-1].status[0].message, 20.0)
+    assert peer.wait(lambda: 'lv1: 10000000 bytes' in told[-1].status[0].message)
     send(1, sp='25', pos=10**400)
     assert peer.wait(lambda: len(one) == 2)
     assert math.isnan(one[1].cv) and math.isnan(one[1].x1) and one[1].p1 == 3.5e6
@@ -183,9 +183,9 @@ def test_judgements_out_survive_the_broker_and_say_when_we_are_gone(
     assert list(dict.fromkeys(texts)) == ['friction up', *(f'change {n}' for n in range(5))]
 
     late = Program(broker.port, 'site/fd/#')
-    assert wait_for(lambda: ('site/fd/lv1/state', True) in [(t, r) for t, _, r in late.got], 10.0)
+    assert wait_for(lambda: ('site/fd/lv1/state', True) in [(t, r) for t, _, r in late.got])
     processes.kill('mqtt')
-    assert wait_for(lambda: late.of('site/fd/status')[-1:] == [b'not_monitored'], 10.0)
+    assert wait_for(lambda: late.of('site/fd/status')[-1:] == [b'not_monitored'])
     for each in (reader, late):
         each.close()
     detectors.close()

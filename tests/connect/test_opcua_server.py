@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from asyncua import Client, Server, ua
+from conftest import PATIENCE
 from connect.detectors import Detectors
 from connect.servers import free_port, listens, wait_for
 from damadics_bringup.processes import executable
@@ -32,7 +33,7 @@ class Events:
     def event_notification(self, event) -> None:
         self.got.append(event)
 
-    async def wait(self, condition, patience: float = 15.0):
+    async def wait(self, condition, patience: float = PATIENCE):
         for _ in range(int(patience / 0.05)):
             if found := [event for event in self.got if condition(event)]:
                 return found[-1]

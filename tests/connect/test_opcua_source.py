@@ -11,7 +11,7 @@ import time
 import numpy as np
 import pytest
 import yaml
-from conftest import Peer, promised
+from conftest import PATIENCE, Peer, promised
 from connect.certificates import make_certificate
 from connect.servers import Server
 from damadics_bringup.processes import executable
@@ -51,7 +51,7 @@ class Connector:
         self.processes = processes
         processes.start('damadics_connect', 'opcua', [str(path)])
 
-    def wait(self, condition, patience: float = 20.0) -> bool:
+    def wait(self, condition, patience: float = PATIENCE) -> bool:
         return self.peer.wait(condition, patience)
 
     def status(self):
@@ -145,7 +145,7 @@ def test_a_lost_server_is_silence_at_once_and_comes_back_without_a_person(connec
     ended = len(samples)
     newest = stamps(samples)[-1] * 1e-9
     assert newest < time.time() - 1.9, 'no sample of the last 2 s while the server is away'
-    assert c.wait(lambda: c.status().level == b'\x02', 3.0), c.status().message
+    assert c.wait(lambda: c.status().level == b'\x02'), c.status().message
     server.kill()
     server.start()
     assert c.wait(lambda: len(samples) > ended + 5), c.log()

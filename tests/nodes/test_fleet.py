@@ -99,11 +99,7 @@ def monitored(fleet) -> None:
 
 
 def call(fleet, kind, name: str, **request) -> None:
-    client = fleet.peer.node.create_client(kind, name)
-    assert fleet.peer.wait(client.service_is_ready, 30.0)
-    future = client.call_async(kind.Request(**request))
-    assert fleet.peer.wait(future.done)
-    assert future.result().success
+    assert fleet.peer.call(kind, name, **request).success
 
 
 def test_every_valve_has_its_own_state(fleet):
@@ -111,8 +107,8 @@ def test_every_valve_has_its_own_state(fleet):
     call(fleet, InjectFault, f'/{FAULTY}/inject_fault', fault=SPRING, strength=1.0)
     call(fleet, Shelve, f'/{SHELVED}/shelve', duration=600.0, user='Anna')
     assert fleet.peer.wait(lambda: fleet.flags[FAULTY][-1].fault, 60.0)
-    fleet.tiles[FAULTY].wait(website.ALARM, 2.0)
-    fleet.tiles[SHELVED].wait(('C',), 2.0)
+    fleet.tiles[FAULTY].wait(website.ALARM)
+    fleet.tiles[SHELVED].wait(('C',))
     fleet.peer.wait(lambda: False, 15.0 if website.PICTURES else 3.0)
     if fleet.page:
         website.picture(fleet.page, 'fleet.png')
@@ -138,7 +134,7 @@ def test_silence_greys_every_tile_and_ends_without_an_alarm(fleet):
         os.kill(pid, signal.SIGSTOP)
     try:
         for tile in fleet.tiles.values():
-            tile.wait(('off',), 3.0)
+            tile.wait(('off',))
         if fleet.page:
             website.picture(fleet.page, 'silent.png')
         assert fleet.peer.wait(
@@ -149,7 +145,7 @@ def test_silence_greys_every_tile_and_ends_without_an_alarm(fleet):
     finally:
         for pid in plants:
             os.kill(pid, signal.SIGCONT)
-    fleet.tiles['fv203'].wait(('ok',), 10.0)
-    fleet.tiles[FAULTY].wait(shown, 10.0)
+    fleet.tiles['fv203'].wait(('ok',))
+    fleet.tiles[FAULTY].wait(shown)
     fleet.peer.wait(lambda: False, 2.0)
     assert {v: fleet.flags[v][-1].occurrence for v in VALVES} == before

@@ -8,6 +8,7 @@ import time
 import numpy as np
 import pytest
 import yaml
+from conftest import PATIENCE
 from damadics_bringup.policy import policy
 from damadics_fd.core.monitor import Chain
 from damadics_fd.core.sample import SIGNALS
@@ -28,6 +29,7 @@ from damadics_msgs.msg import (
 )
 from damadics_msgs.srv import FleetAcknowledge, FleetRelearn
 from diagnostic_msgs.msg import DiagnosticArray
+from permissions import assert_allowed
 from rclpy.qos import QoSProfile
 
 pytestmark = pytest.mark.ros
@@ -87,7 +89,7 @@ class Sender:
             setattr(message, signal, array.array('d', column.tobytes()))
         self.publisher.publish(message)
 
-    def run_until(self, condition, patience: float = 20.0) -> bool:
+    def run_until(self, condition, patience: float = PATIENCE) -> bool:
         """Send blocks in real time until something has come about."""
         deadline = time.monotonic() + patience
         while not condition() and time.monotonic() < deadline:
@@ -126,29 +128,6 @@ class Heard:
         return found[-1] if found else ''
 
 
-def call(sender, kind, service: str, **request):
-    client = sender.peer.node.create_client(kind, service)
-    assert sender.run_until(client.service_is_ready), f'{service} is not served'
-    future = client.call_async(kind.Request(**request))
-    assert sender.run_until(future.done), f'{service} does not answer'
-    return future.result()
-
-
-def assert_policy_allows(graph, file) -> None:
-    """With SROS 2 enforced, a node that may not make one of its topics does not start."""
-    made = {
-        'publish': graph.get_publisher_names_and_types_by_node('fleet', '/'),
-        'subscribe': graph.get_subscriber_names_and_types_by_node('fleet', '/'),
-        'reply': graph.get_service_names_and_types_by_node('fleet', '/'),
-    }
-    profiles = policy(read_fleet(file), blocks=True).getroot().iter('profile')
-    profile = next(p for p in profiles if p.get('node') == 'fleet')
-    for verb, topics in made.items():
-        allowed = {e.text.replace('~', '/fleet', 1) for e in profile.findall(f'*[@{verb}]/*')}
-        names = {name for name, _ in topics}
-        assert names and names <= allowed, f'fleet may not {verb} {names - allowed}'
-
-
 def test_fifty_valves_in_one_process(processes, peer, tmp_path):
     path = tmp_path / 'fleet.yaml'
     path.write_text(
@@ -172,7 +151,7 @@ def test_fifty_valves_in_one_process(processes, peer, tmp_path):
     assert peer.wait(lambda: sender.publisher.get_subscription_count() == 1)
     assert peer.wait(lambda: own.get_subscription_count() == 1)
 
-    assert_policy_allows(peer.node, path)
+    assert_allowed(peer, policy(read_fleet(path), blocks=True), 'fleet')
 
     # a block of another layout is refused, counted, and judged by nobody
     sender.send([0], [1], {'cv': np.array([0.5])})
@@ -231,12 +210,16 @@ def test_fifty_valves_in_one_process(processes, peer, tmp_path):
     sender.layout = version
 
     # people act on one valve, some or all
-    answer = call(sender, FleetAcknowledge, 'fleet/acknowledge', valves=['*'], user='Anna')
+    answer = peer.call(
+        FleetAcknowledge, 'fleet/acknowledge', sender.run_until, valves=['*'], user='Anna'
+    )
     assert not answer.success
     assert answer.message.startswith(f'done for 1 of {VALVES} valves')
     assert len(answer.message) <= SENTENCE
     assert sender.run_until(lambda: 'by Anna' in fleet.events[-1].event.text)
-    answer = call(sender, FleetRelearn, 'fleet/relearn', valves=[f'/{name(LEARNING)}', '/lv999'])
+    answer = peer.call(
+        FleetRelearn, 'fleet/relearn', sender.run_until, valves=[f'/{name(LEARNING)}', '/lv999']
+    )
     assert answer.message == 'done for 1 of 2 valves; /lv999: there is no such valve'
 
     # killed and started again, it has the alarm as it was and shows no valve healthy unseen
@@ -255,7 +238,7 @@ def test_fifty_valves_in_one_process(processes, peer, tmp_path):
 
     # silence is not health
     assert peer.wait(lambda: set(fleet.status[-1].state) == {FaultFlag.STATE_NOT_MONITORING})
-    processes.end('fleet', 10.0)
+    processes.end('fleet')
 
     # two processes with a part of the list each go on where it was, without learning or an event
     halves = {'north': range(VALVES // 2), 'south': range(VALVES // 2, VALVES)}
@@ -278,6 +261,6 @@ def test_fifty_valves_in_one_process(processes, peer, tmp_path):
     assert status['north'][-1].progress[LEARNING] > 0.0, 'it learns from the beginning'
     assert not any(events), 'an alarm is told twice'
     for half in halves:
-        processes.end(half, 10.0)
+        processes.end(half)
     for log in ('fleet', *halves):
         assert 'internal error' not in processes.log(log).read_text()

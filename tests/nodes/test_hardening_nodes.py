@@ -7,6 +7,7 @@ import signal
 import time
 
 import pytest
+from conftest import PATIENCE
 from damadics_bringup.launcher import arguments_of
 from damadics_bringup.processes import parameters
 from damadics_fd.nodes import second_publisher
@@ -24,7 +25,7 @@ HEALTHY, UNKNOWN = FaultFlag.STATE_HEALTHY, FaultFlag.STATE_UNKNOWN
 NAMES = ('estimator', 'detector')
 
 
-def await_state(valve, state, patience=30.0):
+def await_state(valve, state, patience=PATIENCE):
     assert valve.run_until(
         lambda: valve.flags and valve.flags[-1].state == state, patience=patience
     )
@@ -42,7 +43,7 @@ def test_a_damaged_alarm_is_shown_as_lost_until_somebody_confirms(processes, pee
     before = len(valve.flags)
     again = parameters(alarm_folder=str(alarms), **SETTINGS)
     processes.start('damadics_fd', 'detector', again)
-    assert valve.run_until(lambda: len(valve.flags) > before, patience=60.0)
+    assert valve.run_until(lambda: len(valve.flags) > before)
     await_state(valve, UNKNOWN)
     valve.run(2.0)
     assert HEALTHY not in {flag.state for flag in valve.flags[before:]}
@@ -53,7 +54,7 @@ def test_a_damaged_alarm_is_shown_as_lost_until_somebody_confirms(processes, pee
     processes.end('detector')  # a restart is no confirmation
     before = len(valve.flags)
     processes.start('damadics_fd', 'detector', again)
-    assert valve.run_until(lambda: len(valve.flags) > before, patience=60.0)
+    assert valve.run_until(lambda: len(valve.flags) > before)
     await_state(valve, UNKNOWN)
     assert HEALTHY not in {flag.state for flag in valve.flags[before:]}
     assert valve.call(Acknowledge, 'acknowledge', user='Anna', comment='looked at it').success
@@ -100,7 +101,7 @@ def test_samples_that_waited_are_not_healthy(processes, peer):
     valve.peer.node.create_subscription(FaultFlag, 'fault_flag', note, qos.FLAG)
     await_state(valve, HEALTHY, 90.0)
     # an age is counted from the shortest way so far: that of the start may be long
-    assert valve.run_until(lambda: any(age < 0.3 for _, age in ages), patience=60.0)
+    assert valve.run_until(lambda: any(age < 0.3 for _, age in ages))
     os.kill(processes.pid('estimator'), signal.SIGSTOP)
     valve.run(5.0)
     ages.clear()
@@ -245,9 +246,9 @@ def test_a_node_that_gives_way_takes_no_other_with_it(processes, peer):
     processes.start('damadics_fd', 'monitors', words('a1', 'b1'), 'second')
     assert peer.wait(lambda: flags['b1'], 60.0)
     log = processes.log('second')
-    assert peer.wait(lambda: 'another detector sends' in log.read_text(), 20.0)
+    assert peer.wait(lambda: 'another detector sends' in log.read_text())
     before = len(flags['b1'])
-    assert peer.wait(lambda: len(flags['b1']) > before + 3, 15.0), 'the healthy valve has ended'
+    assert peer.wait(lambda: len(flags['b1']) > before + 3), 'the healthy valve has ended'
     assert not processes.ended('second')
     assert 'Traceback' not in log.read_text()
     assert log.read_text().count('FATAL') == 1

@@ -75,5 +75,5 @@ def test_joined_nodes_are_two_nodes_to_everybody_else(processes, peer):
             assert valve.run_until(lambda: len(heard['estimate']) > 10)
         else:
             assert valve.run_until(lambda state=state: valve.flags[-1].state == state)
-    processes.end('monitors', 20.0)
+    processes.end('monitors')
     assert 'internal error' not in processes.log('monitors').read_text()

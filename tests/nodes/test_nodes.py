@@ -49,7 +49,6 @@ def chain(processes, peer):
             and graph.count_publishers('/residual') == 1
             and peer.got['fault_flag']
         ),
-        20.0,
     ), 'the nodes did not start'
     peer.wait(lambda: False, 0.5)
     return peer
@@ -139,21 +138,19 @@ def test_lasting_bad_input_is_told_as_a_failed_sensor(chain, signal, value, ne10
         chain.send(stamp, **{**good, signal: value})
         if n % 40 == 0:
             chain.wait(lambda: False, 0.05)  # no faster than a busy machine takes them
-    assert chain.wait(lambda: any('input has failed' in s.message for s in told()), 5.0)
+    assert chain.wait(lambda: any('input has failed' in s.message for s in told()))
     status = next(s for s in told() if 'input has failed' in s.message)
     assert status.level == DiagnosticStatus.ERROR
     assert f'{signal} = {value:g}' in status.message
     assert 'check' in status.message
     assert {v.key: v.value for v in status.values}['NE 107'] == ne107
-    assert chain.wait(
-        lambda: chain.got['fault_flag'][-1].state == FaultFlag.STATE_NOT_MONITORING, 3.0
-    )
+    assert chain.wait(lambda: chain.got['fault_flag'][-1].state == FaultFlag.STATE_NOT_MONITORING)
     assert chain.got['fault_flag'][-1].level != FaultFlag.NE107_NORMAL
     assert not chain.got['fault_flag'][-1].fault
     before = len(chain.got['estimate'])
     chain.send(stamp + PERIOD, **good)
     assert chain.wait(lambda: len(chain.got['estimate']) == before + 1), 'no recovery'
-    assert chain.wait(lambda: 'input has failed' not in told()[-1].message, 5.0)
+    assert chain.wait(lambda: 'input has failed' not in told()[-1].message)
 
 
 def test_a_late_subscriber_gets_the_last_flag_at_once(chain):
@@ -170,7 +167,7 @@ def test_silence_is_not_health(chain):
     chain.send(PERIOD, 0.5, 0.5)
     flags = chain.got['fault_flag']
     assert chain.wait(lambda: any(f.state == FaultFlag.STATE_HEALTHY for f in flags))
-    assert chain.wait(lambda: flags[-1].state == FaultFlag.STATE_NOT_MONITORING, 3.0)
+    assert chain.wait(lambda: flags[-1].state == FaultFlag.STATE_NOT_MONITORING)
 
 
 @pytest.mark.parametrize('name', ['estimator', 'detector'])

@@ -10,7 +10,7 @@ import time
 from pathlib import Path
 
 import pytest
-from conftest import children
+from conftest import PATIENCE, children
 from damadics_bringup.keeper import Keeper, Task
 from damadics_bringup.processes import Processes, executable
 
@@ -26,7 +26,7 @@ def alive(number: int) -> bool:
     return state != 'Z'
 
 
-def wait_for(condition, patience: float) -> bool:
+def wait_for(condition, patience: float = PATIENCE) -> bool:
     deadline = time.monotonic() + patience
     while not condition() and time.monotonic() < deadline:
         time.sleep(0.05)
@@ -58,7 +58,7 @@ def test_children_end_with_what_started_them(tmp_path, number):
     assert all(map(alive, started))
     parent.send_signal(number)
     parent.wait(10.0)
-    assert wait_for(lambda: not any(map(alive, started)), 5.0), 'they run on'
+    assert wait_for(lambda: not any(map(alive, started))), 'they run on'
 
 
 def test_nodes_end_when_run_is_killed(domain, tmp_path):
@@ -68,13 +68,13 @@ def test_nodes_end_when_run_is_killed(domain, tmp_path):
         stdout=subprocess.DEVNULL,
     )
     try:
-        assert wait_for(lambda: len(children(run.pid)) == 3, 30.0)
+        assert wait_for(lambda: len(children(run.pid)) == 3)
         started = [child.pid for child in children(run.pid)]
         time.sleep(1.0)
     finally:
         run.kill()
         run.wait()
-    assert wait_for(lambda: not any(map(alive, started)), 15.0), 'they run on'
+    assert wait_for(lambda: not any(map(alive, started))), 'they run on'
 
 
 @pytest.mark.parametrize(
@@ -185,7 +185,7 @@ def test_an_interrupt_while_it_imports_leaves_no_traceback(domain):
         [executable('damadics_fd', 'detector')], stderr=subprocess.PIPE, text=True
     )
     maps = Path(f'/proc/{process.pid}/maps')
-    assert wait_for(lambda: 'numpy' in maps.read_text(), 20.0)
+    assert wait_for(lambda: 'numpy' in maps.read_text())
     process.send_signal(signal.SIGINT)
     _, said = process.communicate(timeout=30)
     assert 'Traceback' not in said

@@ -219,7 +219,7 @@ def test_a_stored_trend_is_published_with_its_band_and_the_time_to_its_limit(
         status = [s for m in reports for s in m.status if 'detector' in s.name][-1:]
         return {v.key: v.value for s in status for v in s.values if v.key.startswith('Trend')}
 
-    assert peer.wait(lambda: len(sentences()) == 3, 5.0)
+    assert peer.wait(lambda: len(sentences()) == 3)
     words = sentences()['Trend of spring']
     assert words.startswith('spring ') and '+-' in words
     assert 'limit -0.1 in ' in words and ' days (' in words

@@ -16,13 +16,7 @@ from damadics_msgs.msg import FaultEvent, FaultFlag
 from damadics_msgs.srv import Acknowledge, InjectFault, ResetAlarm
 
 sync_api = pytest.importorskip('playwright.sync_api')
-pytestmark = [
-    pytest.mark.ros,
-    pytest.mark.skipif(
-        not website.CHROMIUM.is_file(),
-        reason='no browser: apt-get install chromium for the tests of the page',
-    ),
-]
+pytestmark = website.IN_A_BROWSER
 ROOT = Path(__file__).resolve().parents[2]
 BAG = ROOT / 'bags' / 'lugre_friction.mcap'
 VALVE = 'lv101'
@@ -68,11 +62,8 @@ class Valve:
 
     def ask(self, kind, name: str, **values: int) -> None:
         """Call a service of the valve's nodes."""
-        client = self.peer.node.create_client(kind, f'/{VALVE}/{name}')
-        assert self.wait(client.service_is_ready)
-        future = client.call_async(kind.Request(**values))
-        assert self.wait(future.done)
-        assert future.result().success, future.result().message
+        answer = self.peer.call(kind, f'/{VALVE}/{name}', self.wait, **values)
+        assert answer.success, answer.message
 
     def be_healthy(self) -> None:
         """Have a valve without fault and alarm."""
@@ -202,7 +193,7 @@ def test_acknowledge_reaches_the_detector_and_the_row(system, page):
     page.get_by_label(f'Acknowledge alarm of {VALVE}').click()
     page.get_by_label('Your name').fill('Anna')
     page.get_by_role('dialog').get_by_role('button', name='Acknowledge').click()
-    assert system.valve.wait(lambda: system.valve.acknowledged, 15.0)
+    assert system.valve.wait(lambda: system.valve.acknowledged)
     page.wait_for_selector('[data-occurrence] .tag.done >> text=acknowledged')
     page.get_by_label(f'Acknowledge alarm of {VALVE}').wait_for(state='hidden')
 

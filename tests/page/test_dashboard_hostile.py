@@ -18,13 +18,7 @@ from damadics_msgs.msg import FaultEvent, FaultFlag, Isolation, OperatorAction
 from damadics_msgs.srv import PartialStroke
 
 sync_api = pytest.importorskip('playwright.sync_api')
-pytestmark = [
-    pytest.mark.ros,
-    pytest.mark.skipif(
-        not website.CHROMIUM.is_file(),
-        reason='no browser: apt-get install chromium for the tests of the page',
-    ),
-]
+pytestmark = website.IN_A_BROWSER
 EVIL = (
     'T" innerHTML="<img src=x onerror=window.pwn=1>" onclick="window.pwn=2" x=\''
     '<img src=x onerror=window.pwn=3><script>window.pwn=4</script>`${window.pwn=5}`{{7*7}}'

@@ -27,7 +27,7 @@ setup(
     extras_require={'test': ['pytest'], 'demo_plant': ['aiomqtt', 'amqtt', 'asyncua']},
     entry_points={
         'console_scripts': [
-            'demo = damadics_bringup.demo:main',
+            'demo = damadics_bringup.start:demo',
             'demo_plant = damadics_bringup.demo_plant.command:main',
             'init = damadics_bringup.init:main',
             'opcua_plant = damadics_bringup.demo_plant.opcua_plant:main',

@@ -30,11 +30,11 @@ setup(
     },
     entry_points={
         'console_scripts': [
-            'opcua = damadics_connect.opcua.command:main',
-            'mqtt = damadics_connect.mqtt.command:main',
-            'http = damadics_connect.http.command:main',
-            'notify = damadics_connect.notify.command:main',
-            'files = damadics_connect.files.command:main',
+            'opcua = damadics_connect.start:opcua',
+            'mqtt = damadics_connect.start:mqtt',
+            'http = damadics_connect.start:http',
+            'notify = damadics_connect.start:notify',
+            'files = damadics_connect.start:files',
         ],
     },
 )

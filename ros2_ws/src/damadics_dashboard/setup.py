@@ -28,7 +28,7 @@ setup(
     extras_require={'test': ['pytest'], 'report': ['fpdf2==2.8.9']},
     entry_points={
         'console_scripts': [
-            'dashboard = damadics_dashboard.dashboard:main',
+            'dashboard = damadics_dashboard.start:dashboard',
             'report = damadics_dashboard.report.command:main',
         ]
     },

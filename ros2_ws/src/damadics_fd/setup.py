@@ -36,7 +36,7 @@ setup(
             'fleet = damadics_fd.start:fleet',
             'recorder = damadics_fd.start:recorder',
             'evaluate = damadics_fd.commands.evaluate:main',
-            'replay = damadics_fd.commands.replay.replay:main',
+            'replay = damadics_fd.start:replay',
             'verify = damadics_fd.commands.verify:main',
             'recover = damadics_fd.commands.recover:main',
             'commission = damadics_fd.commands.commission.command:main',

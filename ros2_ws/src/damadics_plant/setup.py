@@ -24,7 +24,7 @@ setup(
     extras_require={'test': ['pytest', 'hypothesis', 'scipy']},
     entry_points={
         'console_scripts': [
-            'plant = damadics_plant.plant:main',
+            'plant = damadics_plant.start:plant',
             'simulate = damadics_plant.command:main',
             'figures = damadics_plant.figures:main',
         ],

@@ -18,6 +18,7 @@ from damadics_bringup.fleet import MONITORS, spread
 EXAMPLES = """examples:
   ros2 run damadics_bringup policy fleet.yaml --out policy.xml
   ros2 run damadics_bringup policy fleet.yaml --blocks --out policy.xml    with the node fleet
+  ros2 run damadics_bringup policy fleet.yaml --connect opcua --connect notify --out policy.xml
   ros2 security create_keystore keystore
   ros2 security generate_artifacts -k keystore -p policy.xml"""
 # what rclpy makes for every node: without the right to it, a node does not start
@@ -91,6 +92,31 @@ FLEET_TOPICS = tuple(f'fleet/{name}' for name in ('layout', 'status', 'fault_eve
 FLEET_SERVICES = tuple(
     f'fleet/{name}' for name in ('acknowledge', 'reset', 'shelve', 'relearn', 'reference')
 )
+JUDGED = ('fault_flag', 'fault_event')  # what the connectors follow
+FLEET_JUDGED = ('fleet/layout', 'fleet/status', 'fleet/fault_event')
+OPERATED = ('acknowledge', 'reset', 'shelve', 'partial_stroke')  # by their users
+CONNECTORS = {  # nodes of damadics_connect: their rights in every valve, and of the root
+    'opcua': (
+        Rights(('measurement',), (*JUDGED, 'signature', 'operator_action'), (), OPERATED),
+        Rights(('measurement_block', 'fleet/layout', '/diagnostics'), FLEET_JUDGED),
+    ),
+    'mqtt': (
+        Rights(('measurement',), JUDGED),
+        Rights(('measurement_block', 'fleet/layout', '/diagnostics'), FLEET_JUDGED),
+    ),
+    'http': (
+        Rights((), JUDGED, (), OPERATED),
+        Rights((), FLEET_JUDGED),
+    ),
+    'notify': (
+        Rights((), JUDGED),
+        Rights(('/diagnostics',), FLEET_JUDGED),
+    ),
+    'files': (
+        Rights(('measurement',)),
+        Rights(('measurement_block', 'fleet/layout', '/diagnostics')),
+    ),
+}
 PLANT = Rights(('measurement', 'fault_state', '/clock'), ('stroke_request',), ('inject_fault',))
 
 
@@ -99,6 +125,7 @@ def policy(
     simulate: bool = False,
     processes: int = 0,
     blocks: bool = False,
+    connect: Sequence[str] = (),
 ) -> 'ET.ElementTree[ET.Element]':
     """
     Write down what each node of a fleet may do.
@@ -107,6 +134,7 @@ def policy(
     :param simulate: also for the simulated plants.
     :param processes: as given to `run`: nodes of one process share its enclave.
     :param blocks: as given to `run`: one node `fleet` judges all valves.
+    :param connect: the connectors that run, names of CONNECTORS.
     :return: a document of the form that `ros2 security` takes (version 0.2.0).
     """
     root = ET.Element('policy', version='0.2.0')
@@ -144,6 +172,8 @@ def policy(
             )
         ),
     )
+    for name in dict.fromkeys(connect):
+        _enclave(enclaves, '/', name, _of_connector(name, valves))
     events = [
         f'/{v.name}/{node}/transition_event' for v in valves for node in ('estimator', 'detector')
     ]
@@ -165,6 +195,18 @@ def policy(
     )
     ET.indent(root)
     return ET.ElementTree(root)
+
+
+def _of_connector(name: str, valves: Sequence[Valve]) -> Rights:
+    """Give a connector its rights in all valves, and in what one node has of them."""
+    in_valves, rights = CONNECTORS[name]
+    of_valves, of_root = _all(valves, in_valves), _of_root(rights)
+    fleet = [f'/{name}' for name in FLEET_SERVICES if name.removeprefix('fleet/') in OPERATED]
+    return Rights(
+        publish=(*of_valves.publish, *of_root.publish),
+        subscribe=(*of_valves.subscribe, *of_root.subscribe),
+        request=(*of_valves.request, *(fleet if of_valves.request else ())),
+    )
 
 
 def _of_valve(rights: Rights, valve: Valve) -> Rights:
@@ -236,6 +278,13 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument(
         '--blocks', action='store_true', help='as given to run: one node fleet judges all valves'
     )
+    p.add_argument(
+        '--connect',
+        action='append',
+        default=[],
+        choices=CONNECTORS,
+        help='also for this connector of damadics_connect; may be given several times',
+    )
     p.add_argument('--out', type=Path, metavar='FILE', help='write it here (standard output)')
     return p
 
@@ -250,7 +299,7 @@ def main(args: Sequence[str] | None = None) -> int:
     options = parser().parse_args(args)
     try:
         valves = read_fleet(options.fleet)
-        tree = policy(valves, options.simulate, options.processes, options.blocks)
+        tree = policy(valves, options.simulate, options.processes, options.blocks, options.connect)
         text = ET.tostring(tree.getroot(), encoding='unicode', xml_declaration=True) + '\n'
         if options.out:
             options.out.write_text(text)

@@ -252,7 +252,7 @@ class Processes:
                     f'{name} ended with exit code {process.returncode}:\n{self._tail(name)}'
                 )
 
-    def end(self, name: str, patience: float = 20.0) -> None:
+    def end(self, name: str, patience: float = 60.0) -> None:
         """
         End a process with SIGINT and wait for it.
 

@@ -8,17 +8,21 @@ from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 
-INTERRUPTED = 130
+from damadics_fd.leave import INTERRUPTED, ending
 
 
 def run(module: str) -> int:
     """
-    Run the `main` of a module.
+    Run the `main` of a module as this process.
 
     :param module: its name.
     :return: its exit code; 130 where Ctrl-C comes while it is imported, 2 where the middleware
         that the environment asks for is not installed.
     """
+    return ending(lambda: _main(module))
+
+
+def _main(module: str) -> int:
     try:
         problem = missing_middleware()
         if problem:
@@ -79,3 +83,8 @@ def monitors() -> int:
 def recorder() -> int:
     """Run the recorder."""
     return run('damadics_fd.commands.record')
+
+
+def replay() -> int:
+    """Run the command `replay`."""
+    return run('damadics_fd.commands.replay.replay')

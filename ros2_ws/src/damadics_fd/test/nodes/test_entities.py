@@ -34,7 +34,7 @@ def node(monkeypatch):
     executor = EventsExecutor(context=context)
     executor.add_node(node)
 
-    def wait(condition, patience=20.0):
+    def wait(condition, patience=60.0):
         deadline = time.monotonic() + patience
         while not condition() and time.monotonic() < deadline:
             executor.spin_once(timeout_sec=0.05)
