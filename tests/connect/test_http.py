@@ -69,7 +69,7 @@ def served(tmp_path_factory):
             headers={'Authorization': f'Bearer {OPERATOR}'},
             timeout=10.0,
         )
-        assert wait_for(lambda: len(client.get('/api/fleet').json()) == 3, 20.0)
+        assert wait_for(lambda: len(client.get('/api/fleet').json()) == 3)
         yield client, detectors, log
     detectors.close()
     patch.undo()
@@ -179,6 +179,23 @@ def test_hostile_bodies_are_refused_and_the_others_go_on(served, body):
         assert len(answer.text) < 20_000
     except httpx.WriteError:
         pass  # the connection is closed before ten megabytes are taken
+    assert len(detectors.calls) == before
+    assert client.get('/api/fleet').status_code == 200
+
+
+def test_a_body_of_unstated_size_is_refused_when_it_is_too_large(served):
+    client, detectors, _ = served
+    before = len(detectors.calls)
+    pieces = (b'{"comment": "', *(b'x' * 1000 for _ in range(100)), b'"}')
+    try:
+        answer = client.post(
+            '/api/acknowledge/lv101',
+            content=iter(pieces),
+            headers={'Content-Type': 'application/json'},
+        )
+        assert answer.status_code == 413
+    except httpx.WriteError:
+        pass  # the connection is closed before all is taken
     assert len(detectors.calls) == before
     assert client.get('/api/fleet').status_code == 200
 

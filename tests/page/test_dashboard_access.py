@@ -11,11 +11,11 @@ import time
 
 import pytest
 from damadics_dashboard.dashboard import main, read_tokens
-from damadics_dashboard.server import limits
 from damadics_dashboard.server.access import COOKIE, Guard, check_binding
-from damadics_dashboard.server.limits import PatientProtocol, SizeLimit
 from damadics_dashboard.server.log import keep_short
 from damadics_fd.store.access import Access, AccessError, Grant, Role
+from damadics_fd.web import limits
+from damadics_fd.web.limits import PatientProtocol, SizeLimit
 
 uvicorn = pytest.importorskip('uvicorn')
 TOKEN = '0123456789abcdef'

@@ -26,6 +26,7 @@ setup(
         'progpy': ['progpy'],  # test only: an independent plant
         'parquet': ['pyarrow'],
         'cluster': ['dask[distributed]'],
+        'web': ['uvicorn'],  # what a page or a connector serves with
         'compression': ['isal', 'lz4'],  # faster gzip and checksums; bags of others in LZ4
     },
     entry_points={

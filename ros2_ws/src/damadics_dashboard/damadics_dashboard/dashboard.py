@@ -143,13 +143,13 @@ def serve(options: argparse.Namespace, access: Access, ros_args: list[str]) -> i
     _check_port(options.host, options.port)
     # after the check of the arguments, for they take a second
     from damadics_fd.store.intervals import Intervals
+    from damadics_fd.web.limits import PatientProtocol, SizeLimit
     from nicegui import app, ui
 
     from damadics_dashboard.live.trend_points import TrendPoints
     from damadics_dashboard.live.watcher import Watcher
     from damadics_dashboard.pages.frame import FAVICON
     from damadics_dashboard.pages.routes import add_routes
-    from damadics_dashboard.server.limits import PatientProtocol, SizeLimit
     from damadics_dashboard.server.log import keep_short
     from damadics_dashboard.store.history import History
 

@@ -6,6 +6,7 @@ from typing import Annotated
 
 from damadics_fd.core.text import COMMENT, NAME
 from damadics_fd.store.access import Grant
+from damadics_fd.web.limits import SizeLimit
 from fastapi import Depends, FastAPI, HTTPException, Query, Request, Response
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse, StreamingResponse
@@ -69,12 +70,7 @@ def application(watch: Watch, actions: Actions, stream: Stream, guard: Guard) ->
     viewer = Depends(guard.viewer)
     operator = Annotated[Grant, Depends(guard.operator)]
 
-    @app.middleware('http')
-    async def limit(request: Request, call_next):  # type: ignore[no-untyped-def]
-        length = request.headers.get('content-length', '0')
-        if request.method == 'POST' and not (length.isdigit() and int(length) <= LARGEST):
-            return JSONResponse({'detail': f'a request has at most {LARGEST} bytes'}, 413)
-        return await call_next(request)
+    app.add_middleware(SizeLimit, upload=LARGEST, request=LARGEST, remedy='see /docs')
 
     @app.exception_handler(RequestValidationError)
     async def refuse(request: Request, problem: RequestValidationError) -> Response:

@@ -48,6 +48,7 @@ async def serve(path: Path, ros_args: list[str]) -> int:
     """
     try:
         import uvicorn
+        from damadics_fd.web.limits import PatientProtocol
 
         from damadics_connect.http.api import application
         from damadics_connect.http.guard import read_guard
@@ -76,8 +77,7 @@ async def serve(path: Path, ros_args: list[str]) -> int:
                 access_log=False,
                 timeout_graceful_shutdown=1,
                 server_header=False,
-                limit_concurrency=1000,
-                h11_max_incomplete_event_size=65_536,
+                http=PatientProtocol,
             )
         )
         server.install_signal_handlers = lambda: None  # type: ignore[attr-defined]

@@ -37,8 +37,7 @@ class Guard:
         """
         _same_site(request)
         if self._access.open:
-            name = urlsplit(f'//{request.headers.get("host", "")}').hostname or ''
-            if not loopback(name):
+            if not loopback(_host(f'//{request.headers.get("host", "")}')):
                 raise HTTPException(403, 'this name is not one of this machine')
             return Grant(Role.OPERATOR, '')
         header = request.headers.get('authorization', '')
@@ -67,12 +66,18 @@ class Guard:
 def _same_site(request: Request) -> None:
     """Refuse what another site's page in the operator's browser sends."""
     origin = request.headers.get('origin', '')
-    if (
-        origin
-        and request.method != 'GET'
-        and urlsplit(origin).netloc != request.headers.get('host')
-    ):
+    if not origin or request.method == 'GET':
+        return
+    if not _host(origin) or urlsplit(origin).netloc != request.headers.get('host'):
         raise HTTPException(403, 'this request comes from another site')
+
+
+def _host(address: str) -> str:
+    """Return the name of a machine in an address; '' where it is none."""
+    try:
+        return urlsplit(address).hostname or ''
+    except ValueError:
+        return ''
 
 
 def loopback(host: str) -> bool:

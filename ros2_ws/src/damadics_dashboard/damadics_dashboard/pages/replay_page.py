@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from damadics_fd.core.settings import SettingsError
 from damadics_fd.core.text import COMMENT, NAME, plain
+from damadics_fd.web.limits import LARGEST_UPLOAD
 from nicegui import events, run, ui
 
 from damadics_dashboard.live.valve import NE107
@@ -17,7 +18,6 @@ from damadics_dashboard.live.watcher import Watcher
 from damadics_dashboard.pages.elements import box, markup, tell, with_values
 from damadics_dashboard.pages.frame import card, frame
 from damadics_dashboard.pages.plots import News, Options, Plot, signature_plot, time_plot
-from damadics_dashboard.server.limits import LARGEST_UPLOAD
 from damadics_dashboard.words.texts import Texts
 from damadics_dashboard.words.valve_words import cause_of, faults_of, history_rows
 

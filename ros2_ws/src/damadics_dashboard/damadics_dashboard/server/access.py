@@ -3,18 +3,12 @@
 """Who may see the page: this machine, and beyond it who has a token."""
 
 import ipaddress
-from collections.abc import Awaitable, Callable, Mapping, MutableMapping
+from collections.abc import Mapping
 from http.cookies import CookieError, SimpleCookie
 from urllib.parse import parse_qsl, quote, urlencode, urlsplit
 
 from damadics_fd.store.access import Access, AccessError, Grant, Role
-
-Value = str | bytes | int | bool | list[tuple[bytes, bytes]]
-Message = MutableMapping[str, Value]
-Scope = MutableMapping[str, object]
-Receive = Callable[[], Awaitable[Message]]
-Send = Callable[[Message], Awaitable[None]]
-Application = Callable[[Scope, Receive, Send], Awaitable[None]]
+from damadics_fd.web.asgi import Application, Message, Receive, Scope, Send
 
 COOKIE = 'damadics_token'
 LOOPBACK_NAMES = ('localhost', 'localhost.localdomain')

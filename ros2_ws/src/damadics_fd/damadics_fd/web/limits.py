@@ -6,14 +6,14 @@ import asyncio
 from asyncio import TimerHandle
 from typing import TYPE_CHECKING
 
-from damadics_dashboard.server.access import Application, Message, Receive, Scope, Send
+from damadics_fd.web.asgi import Application, Message, Receive, Scope, Send
 
 if TYPE_CHECKING:  # the server takes a second to import: not before the arguments are checked
     from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 else:
     try:
         from uvicorn.protocols.http.auto import AutoHTTPProtocol as HttpToolsProtocol
-    except ImportError:  # pragma: no cover - the page cannot be served, but its parts be tested
+    except ImportError:  # pragma: no cover - nothing can be served, but the parts be tested
         HttpToolsProtocol = asyncio.Protocol
 
 LARGEST_UPLOAD = 2 << 30  # B, of a recording to replay
@@ -34,12 +34,18 @@ class SizeLimit:
     :param app: the application.
     :param upload: bytes of a recording at most.
     :param request: bytes of another request at most.
+    :param remedy: what to do instead, told after the limit.
     """
 
     def __init__(
-        self, app: Application, upload: int = LARGEST_UPLOAD, request: int = LARGEST_REQUEST
+        self,
+        app: Application,
+        upload: int = LARGEST_UPLOAD,
+        request: int = LARGEST_REQUEST,
+        remedy: str = 'ros2 run damadics_fd replay FILE',
     ) -> None:
         self._app = app
+        self._remedy = remedy
         self._upload = upload
         self._request = request
 
@@ -50,7 +56,7 @@ class SizeLimit:
             return
         limit = self._upload if str(scope['path']).startswith(UPLOADS) else self._request
         if _announced(scope) > limit:
-            await _too_large(send, limit)
+            await self._refuse(send, limit)
             return
         taken, begun = 0, False
 
@@ -75,7 +81,13 @@ class SizeLimit:
             await self._app(scope, counted, noted)
         except TooLargeError:
             if not begun:
-                await _too_large(send, limit)
+                await self._refuse(send, limit)
+
+    async def _refuse(self, send: Send, limit: int) -> None:
+        kind = [(b'content-type', b'text/plain; charset=utf-8'), (b'connection', b'close')]
+        await send({'type': 'http.response.start', 'status': 413, 'headers': kind})
+        text = f'larger than the {limit} bytes that are taken: {self._remedy}\n'
+        await send({'type': 'http.response.body', 'body': text.encode()})
 
 
 def _announced(scope: Scope) -> int:
@@ -85,13 +97,6 @@ def _announced(scope: Scope) -> int:
             if key == b'content-length':
                 return int(value) if value.isdigit() else 0
     return 0
-
-
-async def _too_large(send: Send, limit: int) -> None:
-    kind = [(b'content-type', b'text/plain; charset=utf-8'), (b'connection', b'close')]
-    await send({'type': 'http.response.start', 'status': 413, 'headers': kind})
-    text = f'larger than the {limit} bytes that the page takes: ros2 run damadics_fd replay FILE\n'
-    await send({'type': 'http.response.body', 'body': text.encode()})
 
 
 class PatientProtocol(HttpToolsProtocol):
