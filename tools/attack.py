@@ -22,6 +22,7 @@ import time
 from pathlib import Path
 
 import rclpy
+from attacks.connector import attack_connector
 from attacks.page import attack_history, attack_page
 from attacks.prey import HEALTHY, UNKNOWN, Prey
 from damadics_msgs.srv import Acknowledge, Reference, Relearn, ResetAlarm, Shelve
@@ -247,7 +248,12 @@ def main() -> int:
     p.add_argument('--files', type=int, default=2000, help='sets of damaged files (2000)')
     p.add_argument('--requests', type=int, default=1000, help='odd requests (1000)')
     p.add_argument('--signals', type=int, default=200, help='SIGSTOP and SIGKILL (200)')
-    p.add_argument('--pages', type=int, default=500, help='malformed requests to the page (500)')
+    p.add_argument(
+        '--pages',
+        type=int,
+        default=500,
+        help='malformed requests to the page, and to the HTTP connector (500)',
+    )
     p.add_argument('--histories', type=int, default=500, help='damaged histories (500)')
     p.add_argument('--mode', choices=('paper', 'monitor'), default='monitor', help='of the nodes')
     p.add_argument('--seed', type=int, default=1)
@@ -260,6 +266,7 @@ def main() -> int:
         try:
             attack_history(prey.folder, options.histories, prey.random, prey.found)
             attack_page(prey.folder, options.pages, prey.random, prey.found)
+            attack_connector(prey.folder, options.pages, prey.random, prey.found)
             if options.files or options.requests or options.signals:
                 attack_files(prey, options.files)
                 attack_services(prey, options.requests)
