@@ -15,7 +15,7 @@ setup(
         ('share/ament_index/resource_index/packages', ['resource/' + package]),
         ('share/' + package, ['package.xml']),
     ],
-    install_requires=['setuptools'],
+    install_requires=['setuptools', 'llvmlite'],  # comes with numba
     zip_safe=False,
     maintainer='DAMADICS FD maintainers',
     maintainer_email='maintainers@damadics-fd.example',

@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 from damadics_fd.core.approximator.state import Estimate
 from damadics_fd.core.judgement import Judgement
-from damadics_fd.ros.rounds import Rounds
+from damadics_fd.ros.process.rounds import Rounds
 
 MOST_ECHOES = 100_000  # as many as the queue of samples holds
 

@@ -19,7 +19,7 @@ from damadics_fd.ros.entities import Entities
 from damadics_fd.ros.freshness import default_max_age
 from damadics_fd.ros.parameter_files import files_of, says_nothing
 from damadics_fd.ros.parameters import Parameters, declare_settings
-from damadics_fd.ros.rounds import Rounds
+from damadics_fd.ros.process.rounds import Rounds
 from damadics_fd.ros.spin import SpinnableNode, StartError
 from damadics_fd.store.slots import check_folder
 

@@ -13,8 +13,8 @@ from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from rclpy.timer import Timer
 
-from damadics_fd.ros.rounds import Rounds
-from damadics_fd.ros.status_board import StatusBoard
+from damadics_fd.ros.process.rounds import Rounds
+from damadics_fd.ros.process.status_board import StatusBoard
 
 REQUESTS = QoSProfile(depth=1000)  # that may wait for their answer
 TOLD_EVERY = 10.0  # s

@@ -20,7 +20,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
 from damadics_fd.core.text import SENTENCE, plain
-from damadics_fd.ros.clock_step import timers_kept_going
+from damadics_fd.ros.process.clock_step import timers_kept_going
 
 WRONG = (NameValidationException, ParameterException)
 LOOK = 0.1  # s between two looks at whether to end

@@ -9,7 +9,7 @@ import rclpy
 from damadics_fd.ros import own_services, status_board
 from damadics_fd.ros.diagnostics import Diagnostics, Level
 from damadics_fd.ros.entities import Entities
-from damadics_fd.ros.rounds import Rounds
+from damadics_fd.ros.process.rounds import Rounds
 from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState

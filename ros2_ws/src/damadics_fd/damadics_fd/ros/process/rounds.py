@@ -7,8 +7,8 @@ from collections.abc import Callable
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
-from damadics_fd.ros.shared import Shared
-from damadics_fd.ros.status_board import StatusBoard
+from damadics_fd.ros.process.shared import Shared
+from damadics_fd.ros.process.status_board import StatusBoard
 
 
 class Round(Shared[Callable[[], object]]):

@@ -9,7 +9,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 from damadics_fd.ros import qos
-from damadics_fd.ros.shared import Shared
+from damadics_fd.ros.process.shared import Shared
 
 PERIOD = 1.0  # s of wall time
 
