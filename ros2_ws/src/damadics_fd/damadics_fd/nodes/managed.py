@@ -12,13 +12,13 @@ from rclpy.parameter import Parameter
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.text import NAME, plain
 from damadics_fd.nodes.input_watch import InputWatch
-from damadics_fd.ros import own_services
 from damadics_fd.ros.commissioned import commissioned
 from damadics_fd.ros.diagnostics import Diagnostics, Level, Report
 from damadics_fd.ros.entities import Entities
 from damadics_fd.ros.freshness import default_max_age
 from damadics_fd.ros.parameter_files import files_of, says_nothing
 from damadics_fd.ros.parameters import Parameters, declare_settings
+from damadics_fd.ros.process import own_services
 from damadics_fd.ros.process.rounds import Rounds
 from damadics_fd.ros.spin import SpinnableNode, StartError
 from damadics_fd.store.slots import check_folder

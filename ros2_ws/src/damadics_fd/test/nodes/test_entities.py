@@ -6,9 +6,9 @@ import time
 
 import pytest
 import rclpy
-from damadics_fd.ros import own_services, status_board
 from damadics_fd.ros.diagnostics import Diagnostics, Level
 from damadics_fd.ros.entities import Entities
+from damadics_fd.ros.process import own_services, status_board
 from damadics_fd.ros.process.rounds import Rounds
 from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import Transition
