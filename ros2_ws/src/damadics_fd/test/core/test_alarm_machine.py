@@ -5,6 +5,8 @@
 import json
 
 import hypothesis.strategies as st
+import pytest
+from damadics_fd.core.decision import alarm
 from damadics_fd.core.decision.alarm import (
     ACKNOWLEDGED,
     CHANGED,
@@ -15,9 +17,12 @@ from damadics_fd.core.decision.alarm import (
     SHELVED,
     STATE_LATCHED,
     UNSHELVED,
+    Alarm,
 )
 from damadics_fd.core.decision.detector import Detector
 from damadics_fd.core.modes import PHASE_HOLD, PHASE_LEARN_PHI, PHASE_MONITOR
+from damadics_fd.core.settings import Settings
+from hypothesis import given
 from hypothesis import settings as profile
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
@@ -129,3 +134,56 @@ class AlarmMachine(RuleBasedStateMachine):
 
 AlarmMachine.TestCase.settings = profile(max_examples=200, stateful_step_count=30, deadline=None)
 TestAlarmMachine = AlarmMachine.TestCase
+
+
+RESTING = st.fixed_dictionaries(
+    {
+        'stamp': st.integers(-1, 9),
+        'latched': st.booleans(),
+        'flag': st.booleans(),
+        'since': st.integers(0, 9),
+        'pending': st.integers(-1, 9),
+        'last_decision': st.integers(0, 9),
+        'near_misses': st.integers(0, 3),
+    }
+)
+
+
+def rows(values):
+    record = Alarm.rows()
+    alarm.begin(record[0])
+    for name, value in values.items():
+        record[name] = value
+    return record
+
+
+@profile(deadline=None)  # the first one compiles
+@given(RESTING, st.integers(0, 9), *[st.booleans()] * 4)
+def test_what_is_passed_by_is_what_a_step_would_have_done(
+    values, later, armed, busy, moving, present
+):
+    """The short way of nearly every sample has the bits of the long one."""
+    settings = Settings.for_mode('monitor').record()
+    short, long = rows(values), rows(values)
+    stamp = values['stamp'] + later
+    assert alarm.pass_by(short[0], stamp, False, 0)
+    step = alarm.step(long[0], settings[0], stamp, armed, False, busy, 0, 0.5, moving, present)
+    assert step == 0
+    assert short.tobytes() == long.tobytes()
+
+
+@pytest.mark.parametrize(
+    ('values', 'stamp', 'exceed', 'level'),
+    [
+        ({}, 5, True, 0),
+        ({}, 5, False, 1),
+        ({'active': True}, 5, False, 0),
+        ({'excursion': 3}, 5, False, 0),
+        ({'shelved_until': 9}, 5, False, 0),
+        ({'stamp': 6}, 5, False, 0),
+    ],
+)
+def test_what_may_change_the_alarm_is_not_passed_by(values, stamp, exceed, level):
+    record = rows(values)
+    assert not alarm.pass_by(record[0], stamp, exceed, level)
+    assert record.tobytes() == rows(values).tobytes()

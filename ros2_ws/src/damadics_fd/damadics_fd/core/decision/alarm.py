@@ -211,6 +211,27 @@ def judge(
 
 
 @jit
+def pass_by(a: Alarm, stamp: int, exceed: bool, level: int) -> bool:
+    """
+    Take a decision from which nothing follows, as nearly always: `step` without its cost.
+
+    :param a: alarm record.
+    :param stamp: stamp [ns].
+    :param exceed: the residual is over the threshold.
+    :param level: 0..3 as `decision.vote` returns it.
+    :return: False where `step` has to be taken; the record is then as it was.
+    """
+    if level > 0 or exceed or a.active or a.excursion != NEVER:
+        return False
+    if stamp < a.stamp or a.shelved_until > 0:
+        return False
+    a.stamp = stamp
+    a.pending = NEVER
+    refresh(a)
+    return True
+
+
+@jit
 def step(
     a: Alarm,
     c: Settings,

@@ -60,18 +60,21 @@ def step(s: State, c: Settings, g: Known, gc: SignatureSettings, e: Estimate, d:
     ready = e.phase not in (PHASE_PAPER, PHASE_HOLD)
     signature_step.step(g, gc, e.stamp, e.x1, e.ps, e.dp, ready, s.active or s.latched)
     own = own_alarm.own_level(g, gc)
-    d.transitions = alarm.step(
-        s,
-        c,
-        e.stamp,
-        armed or g.own != 0,
-        exceed or own > 0,
-        s.count[0] > 0,
-        max(level, own),
-        ratio,
-        c.mode_code != MONITOR or e.stamp - s.moved < FRESH,
-        own_alarm.persists(g, gc),
-    )
+    exceed_any, worst = exceed or own > 0, max(level, own)
+    d.transitions = 0
+    if not alarm.pass_by(s, e.stamp, exceed_any, worst):
+        d.transitions = alarm.step(
+            s,
+            c,
+            e.stamp,
+            armed or g.own != 0,
+            exceed_any,
+            s.count[0] > 0,
+            worst,
+            ratio,
+            c.mode_code != MONITOR or e.stamp - s.moved < FRESH,
+            own_alarm.persists(g, gc),
+        )
     present = s.active or s.latched
     if g.cause != cause or not present:
         s.told = alarm.NORMAL
