@@ -186,7 +186,12 @@ class _Copy:
         return [Channel(number, 0, f'/lost_channel_{number}', '', {}) for number in found]
 
     def _write(self, batch: Batch, used: set[int], written: BagFile) -> None:
-        rows = np.flatnonzero(np.isin(batch.channels, list(used & self._declared)))
+        saved = used & self._declared
+        if not saved:
+            return
+        rows = np.arange(len(batch.channels))
+        if saved != used:
+            rows = np.flatnonzero(np.isin(batch.channels, list(saved)))
         for first in range(0, len(rows), ROWS):
             self._write_rows(batch, rows[first : first + ROWS], written)
 
