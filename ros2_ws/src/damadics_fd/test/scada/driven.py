@@ -11,11 +11,14 @@ SETTINGS = ScadaSettings(learn_from_s=30.0, learn_s=270.0, t_on_s=40.0, settle_s
 NOISE = 0.0014
 
 
-def driven(seconds: int, seed: int, at: int = 1 << 30, **faults: float) -> np.ndarray:
+def driven(
+    seconds: int, seed: int, at: int = 1 << 30, swing: float = 1.0, **faults: float
+) -> np.ndarray:
     """
     Return rows t, CV, X', P1', P2', T1', F' at 1 Hz of a valve that its command moves.
 
     :param at: from when on the faults act [s]; f7: [K], f17: share of P1.
+    :param swing: how much the command moves.
     """
     rng = np.random.default_rng(seed)
     act = SETTINGS.record()['act'][0]
@@ -23,7 +26,7 @@ def driven(seconds: int, seed: int, at: int = 1 << 30, **faults: float) -> np.nd
     for name, strength in faults.items():
         some[name] = strength
     t = np.arange(float(seconds))
-    cv = 0.5 + 0.25 * np.sin(2 * np.pi * 0.02 * t) + 0.1 * np.sin(2 * np.pi * 0.007 * t)
+    cv = 0.5 + swing * (0.25 * np.sin(2 * np.pi * 0.02 * t) + 0.1 * np.sin(2 * np.pi * 0.007 * t))
     p1, p2 = np.full(seconds, 3.5e6), np.full(seconds, 2.6e6)
     t1 = np.full(seconds, 43.0)
     p1[at:] *= 1.0 - faults.get('f17', 0.0)

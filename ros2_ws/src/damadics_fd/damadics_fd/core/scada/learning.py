@@ -35,6 +35,7 @@ STATED = 0.8  # share to which the stated actuator must cut the variance of an i
 NEARLY, SENSOR = 1.1, 1.5
 LEAST_SAMPLES = 200
 PUSHED = 0.02  # gain of the bias beyond which the actuator is another one
+QUIET, SHIFTED = 0.02, 0.005  # of the stroke: a stem that hardly moves shows no gain, but a shift
 OFF = 1e9  # a limit that is never reached
 NEVER = 9.0  # a change of CV, which is 0..1, is never as large
 JUMPS = (0.05, 3.0)  # a jump of CV is more than this, and than this times the largest learned
@@ -160,7 +161,9 @@ def _choose_stem(
     half = len(x) // 2
     of_law = loss_of(identified.error[half:])
     as_good = best < NEARLY * of_law and math.sqrt(best) < SENSOR * settings.sigma
-    if (best > STATED * of_law and not as_good) or abs(ref.w[1]) > PUSHED:
+    shifted = abs(float(np.mean(prediction.phi[:, :used] @ ref.w[:used])))
+    elsewhere = shifted > SHIFTED and float(ref.x_sd) < QUIET
+    if (best > STATED * of_law and not as_good) or abs(ref.w[1]) > PUSHED or elsewhere:
         ref.stem_kind = LAW
         ref.w[:] = 0.0
         ref.cv_jump = NEVER
