@@ -21,12 +21,13 @@ def assert_allowed(peer, policy: ElementTree, name: str, namespace: str = '/') -
     assert len(found) == 1, f'{name} has {len(found)} profiles'
     graph = peer.node
     assert peer.wait(lambda: (name, namespace) in graph.get_node_names_and_namespaces())
+    serves = graph.get_service_names_and_types_by_node
+    assert peer.wait(lambda: serves(name, namespace)), f'{name} serves nothing'
     for verb, made in (
         ('publish', graph.get_publisher_names_and_types_by_node(name, namespace)),
         ('subscribe', graph.get_subscriber_names_and_types_by_node(name, namespace)),
-        ('reply', graph.get_service_names_and_types_by_node(name, namespace)),
+        ('reply', serves(name, namespace)),
         ('request', graph.get_client_names_and_types_by_node(name, namespace)),
     ):
         refused = {topic for topic, _ in made} - allowed(found[0], verb)
         assert not refused, f'{name} may not {verb} {refused}'
-        assert made or verb != 'reply', f'{name} serves nothing'
