@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The NE 107 class of an alarm: the worse of residual and cause, the same wherever it is read."""
 
+import math
+
 import numpy as np
 import pytest
 from damadics_fd.causes import explain, load_causes
@@ -21,7 +23,7 @@ from damadics_fd.core.monitor import run
 from damadics_fd.core.result import Result
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.signature.settings import SignatureSettings
-from damadics_fd.core.signature.state import CAUSES
+from damadics_fd.core.signature.state import CAUSES, STATE_ALARM
 
 from .test_alarm import Valve
 
@@ -62,6 +64,43 @@ def test_the_table_of_the_user_decides():
     assert without.detector.decision.level == MAINTENANCE_REQUIRED
     with pytest.raises(ValueError, match='classes'):
         SignatureSettings(ne107=(0, 1))
+
+
+def own_alarm(value: float, std: float) -> Valve:
+    """Return a valve whose limit is 2 and whose signature has an alarm of its own."""
+    valve = Valve(level_maintenance=2.0, level_specification=3.0, level_failure=4.0)
+    valve.detector = Detector(valve.settings, load_causes().classes)
+    valve.feed(0.1, 0.1)
+    known = valve.detector.signature.state[0]
+    known.own, known.cause, known.cause_value, known.cause_std = 1, FRICTION, value, std
+    known.state, known.ne[:] = STATE_ALARM, 0.0
+    valve.feed(0.1, 0.1)
+    return valve
+
+
+@pytest.mark.plain
+def test_a_residual_below_its_limit_does_not_make_a_small_change_matter():
+    valve = own_alarm(0.1, 0.01)
+    assert valve.feed(0.1).level == NORMAL
+    assert valve.feed(1.9, 1.0).level == NORMAL, 'it is over the threshold, not over the limit'
+    valve.feed(2.5)
+    assert valve.feed(0.1).level == NORMAL, 'one sample decides nothing'
+    assert valve.feed(2.5, 1.0).level == MAINTENANCE_REQUIRED
+    assert valve.feed(0.1).level == MAINTENANCE_REQUIRED, 'what was decided stays'
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize('cause', ['undetermined', 'unconfirmed'])
+def test_an_own_alarm_is_normal_until_its_size_is_known(cause):
+    valve = own_alarm(math.nan, math.nan)
+    known = valve.detector.signature.state[0]
+    known.cause, known.alarm_t = CAUSES.index(cause), 1
+    known.now[:], known.now_t = (0.0, 0.0, 0.5), 1
+    assert valve.feed(0.1, 90.0).level == NORMAL, 'what was known before is not of this alarm'
+    known.now_t = 2
+    assert valve.feed(0.1).level == MAINTENANCE_REQUIRED
+    known.now[:] = (0.002, 0.0, 0.1)
+    assert valve.feed(0.1).level == NORMAL
 
 
 @pytest.mark.plain

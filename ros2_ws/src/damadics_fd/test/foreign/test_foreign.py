@@ -102,6 +102,18 @@ def test_a_stem_that_sticks_and_slips_is_told(seed, sticks):
     assert any('sticks and slips' in remark for remark in proposal.remarks) is sticks
 
 
+@pytest.mark.parametrize('lag', [0.0, 0.1])
+def test_sticking_and_slipping_is_not_taken_for_friction(lag):
+    build = kinds.random_valve(140, ps_lag=lag)
+    proposal = commissioned(build, 140)
+    b = proposal.balance
+    assert b.settings.stiffness == pytest.approx(build.stiffness, rel=0.01)
+    assert b.friction == pytest.approx(build.dry * build.force, rel=0.05)
+    t = trial(build, proposal, 'friction +100 %', 140, quiet=600.0)
+    assert (t.false_alarms, t.right) == (0, True)
+    assert t.size == pytest.approx(1.0, rel=0.15)
+
+
 def test_stated_deviations_cover_the_truth():
     missed = []
     for seed in range(140, 146):

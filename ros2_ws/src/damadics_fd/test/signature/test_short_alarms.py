@@ -151,8 +151,10 @@ def test_small_named_changes_are_not_material(learned):
     assert (material(s, c, False), material(s, c, True)) == (False, True)  # hysteresis
     s.cause, s.own, s.t, s.alarm_t = st.CAUSE_UNDETERMINED, 1, 5 * SECOND, 0
     assert not material(s, c, False), 'the own alarm has a size first'
-    s.t = 10 * SECOND
-    assert material(s, c, False)
+    s.now_t, s.now[:] = 5 * SECOND, (0.0, 0.0, 0.1)
+    assert not material(s, c, False), 'friction by 10 %'
+    s.now[:] = (0.03, 0.0, 0.1)
+    assert material(s, c, False), 'and the spring by 3 %'
 
 
 def test_a_clock_that_is_set_back_ends_no_alarm(learned):

@@ -16,6 +16,7 @@ from damadics_fd.commands.commission.lag import (
     SIGN_GAIN,
     WIDTH,
     Lag,
+    Mask,
     find_lag,
     trust,
 )
@@ -23,7 +24,6 @@ from damadics_fd.commands.commission.regression import (
     ONE,
     TABLE,
     K,
-    Mask,
     S,
     V,
     add_viscous_prior,
@@ -38,6 +38,7 @@ from damadics_fd.core.settings import Settings
 
 BLOCK = 0.1  # s
 SAME_LAG = 0.003  # s
+NO_LAG = 0.9  # of the misfit with a lag: without it less is left, of other blocks though
 LEAST = 20  # moving blocks each way
 MODEL_ERROR = 1e-3  # of the spring force over the stroke: the balance is no better than that
 WIDE, NARROW = (0.5, 0.2), (0.05, 0.03)  # prior of the plug force: in common, per node
@@ -63,6 +64,7 @@ class Balance:
     t: Floats
     x: Floats
     v: Floats
+    sticky: Mask  # the stem sticks and slips within the block
     force: Floats  # without the plug force [N]
     fitted: Floats
     columns: Floats  # of K, b, c, Fc: shape (n, 4)
@@ -118,10 +120,11 @@ def find_balance(
     if abs(again.seconds - lag.seconds) >= SAME_LAG:
         lag = again
         balance = _with_lag(signals, s, lag, sheet, given, undetermined)
-    if lag.seconds > 0.0:  # a lag that leaves more than none was no lag
-        none = _with_lag(signals, s, replace(lag, seconds=0.0), sheet, given, undetermined)
-        if none.misfit < balance.misfit:
-            return none
+    if lag.seconds > 0.0:  # a lag that leaves clearly more than none was no lag
+        without = replace(lag, seconds=0.0)
+        none = _with_lag(signals, s, without, sheet, given, undetermined, lag.seconds)
+        if none.misfit < NO_LAG * balance.misfit:
+            return _with_lag(signals, s, without, sheet, given, undetermined)
     return balance
 
 
@@ -132,12 +135,13 @@ def _with_lag(
     sheet: Settings,
     given: Collection[str],
     undetermined: list[str],
+    carried: float = 0.0,
 ) -> Balance:
     s = s.replace(
         ps_lag=float(f'{lag.seconds:.3g}'),
         ps_lag_std=float(f'{lag.std:.2g}') if lag.std < 1.0 else 1.0,
     )
-    b = blocks(signals, BLOCK, s.ps_lag)
+    b = blocks(signals, BLOCK, s.ps_lag, carried)
     use = _enough(b)
     s, gain, shape = _plug(b, use, s, sheet, given)
     return _final(b, use, s, lag, gain, shape, sheet, given, undetermined)
@@ -191,7 +195,15 @@ def _plug(
         precision[TABLE:, TABLE:] = np.linalg.inv(table)
         add_viscous_prior(precision, mean, A, force[use], b.v[use], given)
         floor = MODEL_ERROR * s.stiffness * s.stroke
-        fit = solve(A, force[use], precision, mean, floor, trust(b.v[use]), blur_of(b, use, s))
+        fit = solve(
+            A,
+            force[use],
+            precision,
+            mean,
+            floor,
+            trust(b.v[use], b.sticky[use]),
+            blur_of(b, use, s),
+        )
         e_total = np.maximum(e_total * (1.0 + fit.theta[TABLE:]), 0.003)
         rows = _with_table(base, e_total)
         common, per_node = NARROW
@@ -231,7 +243,15 @@ def _final(
         precision[TABLE:, TABLE:] = np.linalg.inv(table)
     add_viscous_prior(precision, mean, A, force[use], b.v[use], given)
     floor = MODEL_ERROR * s.stiffness * s.stroke
-    fit = solve(A, force[use], precision, mean, 0.2 * floor, trust(b.v[use]), blur_of(b, use, s))
+    fit = solve(
+        A,
+        force[use],
+        precision,
+        mean,
+        0.2 * floor,
+        trust(b.v[use], b.sticky[use]),
+        blur_of(b, use, s),
+    )
     K_, offset, viscous, dry, slow = (float(v) for v in fit.theta[:5])
     origin = offset / (K_ * s.stroke) if K_ != 0.0 else np.inf
     preload = origin if s.air_to == 'close' else -1.0 - origin
@@ -262,6 +282,7 @@ def _final(
         b.t[use],
         b.x[use],
         b.v[use],
+        b.sticky[use],
         force[use],
         force[use] - fit.left,
         model,

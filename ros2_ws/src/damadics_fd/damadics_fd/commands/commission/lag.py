@@ -13,11 +13,13 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from damadics_fd.commands.commission.signals import Blocks
 from damadics_fd.core.record import Floats
 from damadics_fd.core.settings import Settings
 
+Mask = NDArray[np.bool_]
 WIDTH = 0.04  # s: two periods of 50 Hz
 GRID = (0.0, 0.01, 0.02, 0.03, 0.05, 0.07, 0.1, 0.14, 0.2, 0.28, 0.4, 0.56, 0.8)  # s
 SHORTEST, LONGEST = 5, 120  # blocks of a stroke that are used
@@ -32,6 +34,7 @@ LEAST_STD = 2e-3  # s; what blocks and model leave open
 FREE, NODES = 6, 11  # columns besides the plug force; nodes of its table
 SIGNED = (0, 2, 3)  # stiffness, viscous and dry friction push against the air
 SURE = 0.045  # strokes/s well above which nothing sticks any more
+STICKY = 0.5  # as doubtful as a block that slow
 CREEP = 40.0  # times the variance of a block that hardly moves
 
 
@@ -60,14 +63,16 @@ def plug_per_pascal(s: Settings, x: Floats) -> Floats:
     return area
 
 
-def trust(v: Floats) -> Floats:
+def trust(v: Floats, sticky: Mask | bool = False) -> Floats:
     """
-    Return the weight of blocks: slow ones hold jumps between sticking and sliding.
+    Return the weight of blocks: slow and sticky ones hold jumps between sticking and sliding.
 
     :param v: [strokes/s].
+    :param sticky: blocks in which the stem sticks and slips.
     :return: at most 1.
     """
-    weight: Floats = 1.0 / (1.0 + CREEP * np.exp(-((v / SURE) ** 2)))
+    slow = np.exp(-((v / SURE) ** 2))
+    weight: Floats = 1.0 / (1.0 + CREEP * np.maximum(slow, np.where(sticky, STICKY, 0.0)))
     return weight
 
 

@@ -6,14 +6,13 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from damadics_fd.commands.commission.lag import STRIBECK, plug_per_pascal
+from damadics_fd.commands.commission.lag import STRIBECK, Mask, plug_per_pascal
 from damadics_fd.commands.commission.signals import Blocks
 from damadics_fd.core.record import Floats
 from damadics_fd.core.settings import Settings
+from damadics_fd.core.signature.sliding import STICKING
 
-Mask = NDArray[np.bool_]
 VISCOUS_STD = 0.3  # how well a data sheet's viscous friction is known, as a share
 MILD = 0.15  # viscous share of friction at the usual speed, give or take as much
 K, ONE, V, S, SLOW, LATE, TABLE = range(7)
@@ -58,14 +57,15 @@ def regressor(b: Blocks, s: Settings) -> tuple[Floats, Floats, Floats]:
     gain = flow * plug_per_pascal(s, b.x)
     plug = gain * b.dp
     v = np.nan_to_num(b.v)
-    sign = np.sign(v)
+    sign, sticky = np.sign(v), b.sticky
+    slow = np.where(sticky, 1.0, np.exp(-((v / STRIBECK) ** 2)))
     columns = np.stack(
         [
             s.stroke * b.x,
             np.ones(len(v)),
             s.stroke * v,
-            sign,
-            sign * np.exp(-((v / STRIBECK) ** 2)),
+            np.where(sticky, 1.0 + STICKING, 1.0) * sign,
+            sign * slow,
             gain * b.rate_dp,
         ],
         axis=1,

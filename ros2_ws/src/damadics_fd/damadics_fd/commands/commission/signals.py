@@ -12,6 +12,7 @@ from damadics_fd.core.approximator.transmitter import delay_column
 from damadics_fd.core.record import Floats, Ints
 from damadics_fd.core.settings.identified import FaultFree
 from damadics_fd.core.signature.blocks import STEADY
+from damadics_fd.core.signature.sliding import BEYOND_NOISE, STAIRS
 
 NEEDED = ('cv', 'x1', 'p1', 'p2', 'ps')
 APART = 60.0  # s between two recordings on the common axis
@@ -50,6 +51,7 @@ class Blocks:
     ps: Floats
     v: Floats  # strokes/s
     rate_dp: Floats  # Pa/s
+    rough: Floats  # variance of the position about a straight motion
 
     @property
     def moving(self) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
@@ -59,6 +61,20 @@ class Blocks:
         :return: mask.
         """
         return self._in_motion(STEADY)
+
+    @property
+    def sticky(self) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+        """
+        Tell about which blocks the stem sticks and slips: it moves by stairs.
+
+        A block may lie within one slip, so that its neighbours tell as well.
+
+        :return: mask.
+        """
+        noise = float(np.percentile(self.rough, 25.0))
+        way = STAIRS * np.abs(np.nan_to_num(self.v)) * self.width
+        rough = np.maximum(self.rough, np.maximum(np.roll(self.rough, 1), np.roll(self.rough, -1)))
+        return rough > np.maximum(BEYOND_NOISE * noise, noise + way**2)
 
     @property
     def jumps(self) -> float:
@@ -154,13 +170,14 @@ def gather(recordings: Sequence[FaultFree]) -> Signals:
     return Signals(t, cv, x, p1 - p2, ps, part, rate, len(t) / total)
 
 
-def blocks(signals: Signals, width: float, lag: float = 0.0) -> Blocks:
+def blocks(signals: Signals, width: float, lag: float = 0.0, carried: float = 0.0) -> Blocks:
     """
     Return means over blocks of which enough samples are good.
 
     :param signals: the samples.
     :param width: of a block [s].
     :param lag: position and P1 - P2 are delayed by it first, as the chamber pressure is [s].
+    :param carried: how long a slip is felt at least, where lags are compared [s].
     :return: whole blocks in order of time.
     """
     x, dp = signals.x, signals.dp
@@ -177,8 +194,13 @@ def blocks(signals: Signals, width: float, lag: float = 0.0) -> Blocks:
         mean: Floats = (np.add.reduceat(signal, first) / count)[whole]
         return mean
 
-    index, part = index[first][whole], signals.part[first][whole]
     t, mx, mdp = means(signals.t), means(x), means(dp)
+    within = signals.t - np.repeat(index[first], count) * width
+    mt = means(within)
+    raw = means(signals.x)  # a delay would smooth the stairs
+    both = means(signals.x * within) - raw * mt
+    rough = means(signals.x**2) - raw**2 - both**2 / np.maximum(means(within**2) - mt * mt, 1e-12)
+    index, part = index[first][whole], signals.part[first][whole]
     mid = np.zeros(len(t), bool)
     mid[1:-1] = (np.diff(index)[1:] == 1) & (np.diff(index)[:-1] == 1)
     v, rate_dp = np.full(len(t), np.nan), np.zeros(len(t))
@@ -187,4 +209,8 @@ def blocks(signals: Signals, width: float, lag: float = 0.0) -> Blocks:
         v[1:-1] = (mx[2:] - mx[:-2]) / span
         rate_dp[1:-1] = (mdp[2:] - mdp[:-2]) / span
     v[~mid] = np.nan
-    return Blocks(width, index, part, t, mx, means(signals.cv), mdp, means(signals.ps), v, rate_dp)
+    mcv, mps, rough = means(signals.cv), means(signals.ps), np.maximum(rough, 0.0)
+    felt = max(lag, carried)
+    if felt > 0.0:  # what the delay carries over from the block before
+        rough[1:] = np.maximum(rough[1:], rough[:-1] * np.exp(-width / felt))
+    return Blocks(width, index, part, t, mx, mcv, mdp, mps, v, rate_dp, rough)

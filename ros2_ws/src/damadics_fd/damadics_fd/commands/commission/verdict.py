@@ -43,7 +43,7 @@ def smallest(b: Balance, seconds: float) -> Found:
     """
     c = SignatureSettings.of(b.settings)
     sigma = max(b.misfit, c.sigma_min * c.force_scale)
-    w = trust(b.v)
+    w = trust(b.v, b.sticky)
     A = b.columns / sigma
     S_all = (A * w[:, None]).T @ A
     per = np.array([b.settings.stroke, 1.0, b.settings.stroke, 1.0])
@@ -75,7 +75,7 @@ def parts_differ(b: Balance) -> list[str]:
     lean = np.zeros((4, 4))  # the viscous part is that of all, give or take the dry one
     lean[2, 2] = (0.3 * b.viscous + 10.0 * b.friction / b.settings.stroke + 1e-9) ** -2
     for part in order:
-        A, y, w = b.columns[part], b.force[part], trust(b.v[part])
+        A, y, w = b.columns[part], b.force[part], trust(b.v[part], b.sticky[part])
         up = int(np.sum(b.v[part] > 0.0))
         if min(up, len(part) - up) < 5 or np.ptp(b.x[part]) < 0.1:
             continue

@@ -31,6 +31,7 @@ class State(Votes, Alarm):
     place: float
     moved: int
     told: int
+    decided: bool  # the approximator has a part in the present alarm
 
 
 @layer
@@ -76,6 +77,7 @@ def step(s: State, c: Settings, g: Known, gc: SignatureSettings, e: Estimate, d:
             own_alarm.persists(g, gc),
         )
     present = s.active or s.latched
+    s.decided = present and (s.decided or level > 0)
     if g.cause != cause or not present:
         s.told = alarm.NORMAL
         if present:
@@ -106,7 +108,7 @@ def class_of(s: State, g: Known, gc: SignatureSettings, armed: bool) -> int:
     :return: a class; normal for a change too small for maintenance.
     """
     level: int = alarm.level_of(s, armed)
-    if s.peak < 1.0 and not own_alarm.material(g, gc, s.told > alarm.NORMAL):
+    if not s.decided and not own_alarm.material(g, gc, s.told > alarm.NORMAL):
         return alarm.NORMAL  # the approximator is content and the change is small
     return max(level, int(gc.ne107[g.cause]))
 

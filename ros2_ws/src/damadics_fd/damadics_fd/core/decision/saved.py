@@ -31,9 +31,9 @@ RANGES = {  # of the whole numbers by name
     'moved': STAMP,
     'told': (0, FAILURE),
 }
-FLAGS = ('active', 'latched', 'acknowledged', 'flag', 'chatter', 'unknown')
+FLAGS = ('active', 'latched', 'acknowledged', 'flag', 'chatter', 'unknown', 'decided')
 NUMBERS = ('peak', 'excursion_peak', 'place')
-LATER: Saved = {'unknown': False}  # fields that states of before do not have
+LATER: Saved = {'unknown': False, 'decided': True}  # fields that states of before do not have
 
 
 def complete(saved: Mapping[str, Plain]) -> Saved:

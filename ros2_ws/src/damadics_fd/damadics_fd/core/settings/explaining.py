@@ -45,5 +45,5 @@ class Explaining(Section):
         '', 'change of stiffness that asks for maintenance', 0.0, 1.0, 0.02, modes=MONITOR
     )
     material_supply: float = number(
-        '', "loss of the chamber's top filling rate that alarms", 0.01, 0.9, 0.1, modes=MONITOR
+        '', 'loss of supply pressure that alarms, as a share', 0.01, 0.9, 0.13, modes=MONITOR
     )

@@ -17,8 +17,10 @@ from damadics_fd.core.signature.state import FILL, STROKES, VENT, Air, State
 
 P_ATM = 101325.0  # [Pa]
 ALIKE = 0.9  # [1] strokes at full opening differ by 4 % at most, those of ramps by 10 to 40 %
-ELSEWHERE = 0.5  # of the pressure of one stroke of the spring
+ELSEWHERE = 0.4  # of the pressure of one stroke of the spring
 P_FLOOR = 5e3  # [Pa] less driving pressure than this says nothing
+CHOKED = 0.3  # ratio of pressures below which the flow is sonic, ISO 6358
+AS_BEFORE = 0.05  # change of the top venting rate that is none
 MIN_STROKE = 0.15  # [1] a shorter stroke may not reach its top rate; holding against P1 does not
 
 
@@ -69,7 +71,7 @@ def end_stroke(s: Air, c: SignatureSettings, learn: bool) -> bool:
     """
     Take the second best rate of a stroke into the reference or the latest strokes.
 
-    Both are medians; a stroke at another chamber pressure is left out.
+    Both are the second best of the strokes; a stroke at another chamber pressure is left out.
 
     :param s: state record.
     :param c: settings record.
@@ -84,22 +86,48 @@ def end_stroke(s: Air, c: SignatureSettings, learn: bool) -> bool:
             s.air_ring[way, s.air_learned[way]] = s.air_second
             s.air_ring_ps[way, s.air_learned[way]] = s.air_ps
             s.air_learned[way] += 1
-            s.air_ref[way] = s.air_ring[way, middle(s.air_ring[way], s.air_learned[way])]
-            at = middle(s.air_ring_ps[way], s.air_learned[way])
-            s.air_ref_ps[way] = s.air_ring_ps[way, at]
+            usual = second_best(s.air_ring[way], s.air_learned[way])
+            s.air_ref[way] = s.air_ring[way, usual]
+            s.air_ref_ps[way] = s.air_ring_ps[way, usual]
         return False
     if s.air_ref_ps[way] > 0.0 and abs(s.air_ps - s.air_ref_ps[way]) > ELSEWHERE * swing(c):
         return False  # another process pressure, another driving pressure: it does not compare
     slot = s.air_count[way] % STROKES
-    s.air_ring[way, slot] = s.air_second
+    s.air_ring[way, slot] = s.air_second * elsewhere(c, way, s.air_ps, s.air_ref_ps[way])
     s.air_ring_ps[way, slot] = s.air_ps
     s.air_count[way] += 1
     if s.air_count[way] < STROKES:
         return False
-    usual = middle(s.air_ring[way], STROKES)
+    usual = second_best(s.air_ring[way], STROKES)
     s.air_rate[way] = s.air_ring[way, usual] / s.air_ref[way]
     s.air_rate_ps[way] = s.air_ring_ps[way, usual]
     return True
+
+
+@jit
+def elsewhere(c: SignatureSettings, way: int, ps: float, at: float) -> float:
+    """
+    Restate a rate per root of the driving pressure at another chamber pressure.
+
+    A sonic flow does not follow that root: half-way between the two laws, see `supply_change`.
+
+    :param c: settings record.
+    :param way: FILL or VENT.
+    :param ps: [Pa] chamber pressure at which the rate was taken.
+    :param at: [Pa] chamber pressure to compare at; 0 where it is not known.
+    :return: factor on the rate.
+    """
+    if at <= 0.0:
+        return 1.0
+    supply = P_ATM + c.supply_pressure
+    if way == FILL:
+        here, there = flow_square(supply, P_ATM + ps), flow_square(supply, P_ATM + at)
+        drive_here, drive_there = c.supply_pressure - ps, c.supply_pressure - at
+    else:
+        here, there = flow_square(P_ATM + ps, P_ATM), flow_square(P_ATM + at, P_ATM)
+        drive_here, drive_there = ps, at
+    factor: float = (there * drive_here / (here * drive_there)) ** 0.25
+    return factor
 
 
 @jit
@@ -114,20 +142,20 @@ def swing(c: SignatureSettings) -> float:
 
 
 @jit
-def middle(values: Floats, n: int) -> int:
+def second_best(values: Floats, n: int) -> int:
     """
-    Find the median, which a spike does not move.
+    Find the second largest, which neither a spike moves nor strokes too short to open fully.
 
     :param values: a few.
     :param n: how many of them count, at least 1.
-    :return: index of the lower median.
+    :return: its index; of a single value that one.
     """
     for i in range(n):
-        below = 0
+        above = 0
         for j in range(n):
-            if values[j] < values[i] or (values[j] == values[i] and j < i):
-                below += 1
-        if below == (n - 1) // 2:
+            if values[j] > values[i] or (values[j] == values[i] and j < i):
+                above += 1
+        if above == min(1, n - 1):
             return i
     return 0
 
@@ -139,13 +167,13 @@ def supply_lost(s: Air, c: SignatureSettings) -> bool:
 
     :param s: state record.
     :param c: settings record.
-    :return: True if it does, by more than the settings allow.
+    :return: True if it does, by a loss of pressure larger than the settings allow.
     """
     enough = s.air_count[FILL] >= STROKES and s.air_count[VENT] >= STROKES
     lost: bool = (
         enough
-        and s.air_rate[FILL] < 1.0 - c.material_supply
-        and abs(s.air_rate[VENT] - 1.0) < 0.5 * c.material_supply
+        and abs(s.air_rate[VENT] - 1.0) < AS_BEFORE
+        and supply_change(s, c) < -c.material_supply * c.supply_pressure
     )
     return lost
 
@@ -171,13 +199,51 @@ def supply_change(s: Air, c: SignatureSettings) -> float:
     """
     Estimate the change of the supply pressure from the filling rate.
 
+    Where the passages of a positioner are sonic the flow follows the supply alone, where they
+    are not the root of the pressure difference; ISO 6358 lies between, and which of them are is
+    not known: the mean of both laws.
+
     :param s: state record.
     :param c: settings record.
     :return: [Pa], negative for a loss.
     """
     ps = s.air_rate_ps[FILL]
-    change: float = (s.air_rate[FILL] ** 2 - 1.0) * (c.supply_pressure - ps)
+    share = s.air_rate[FILL] ** 2
+    by_root = (share - 1.0) * (c.supply_pressure - ps)
+    by_sonic = supply_of(share * flow_square(P_ATM + c.supply_pressure, P_ATM + ps), P_ATM + ps)
+    change: float = 0.5 * (by_root + by_sonic - P_ATM - c.supply_pressure)
     return change
+
+
+@jit
+def flow_square(up: float, down: float) -> float:
+    """
+    Return the square of the mass flow per conductance after ISO 6358.
+
+    :param up: [Pa] absolute pressure before the restriction.
+    :param down: [Pa] behind it.
+    :return: [Pa2].
+    """
+    beyond = max(down - CHOKED * up, 0.0) / (1.0 - CHOKED)
+    return up * up - beyond * beyond
+
+
+@jit
+def supply_of(square: float, down: float) -> float:
+    """
+    Invert `flow_square`.
+
+    :param square: [Pa2] of the flow.
+    :param down: [Pa] absolute pressure behind the restriction.
+    :return: [Pa] absolute pressure before it.
+    """
+    up = math.sqrt(square)
+    if down <= CHOKED * up:
+        return up
+    room = (1.0 - CHOKED) ** 2
+    a = room - CHOKED * CHOKED
+    b = CHOKED * down
+    return (math.sqrt(b * b + a * (down * down + square * room)) - b) / a
 
 
 @jit

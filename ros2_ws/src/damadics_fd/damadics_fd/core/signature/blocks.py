@@ -11,6 +11,13 @@ import math
 
 from damadics_fd.core.jit import jit, layer
 from damadics_fd.core.signature.settings import SignatureSettings
+from damadics_fd.core.signature.sliding import (
+    STICKING,
+    STICKY_DOUBT,
+    follow_roughness,
+    sticks,
+    undelayed,
+)
 from damadics_fd.core.signature.state import (
     LAG,
     N_TABLE,
@@ -86,6 +93,10 @@ def open_block(s: Blocks, index: int) -> None:
     s.sp = 0.0
     s.sg = 0.0
     s.st = 0.0
+    s.sr = 0.0
+    s.srr = 0.0
+    s.srt = 0.0
+    s.stt = 0.0
 
 
 @layer
@@ -98,17 +109,25 @@ def add_sample(
     :param s: state record.
     :param c: settings record.
     :param offset: [s] time since the start.
-    :param x: raw position / stroke.
+    :param x: position / stroke, as late as the chamber pressure.
     :param ps: [Pa] chamber pressure, gauge.
     :param dp: [Pa] P1 - P2.
     """
     pb = c.diaphragm_area * ps / c.force_scale
+    within = offset - s.index * c.block
+    raw = x
+    if c.ps_lag > 0.0:
+        raw = undelayed(s, c, offset, x)
     s.n += 1
     s.sx += x
     s.sp += pb
     s.su += c.weight / c.force_scale + pb - dp * plug_gain(c, x)
     s.sg += dp
     s.st += offset
+    s.sr += raw
+    s.srr += raw * raw
+    s.srt += raw * within
+    s.stt += within * within
 
 
 @jit
@@ -134,6 +153,7 @@ def close_block(s: Blocks, c: SignatureSettings) -> bool:
     s.bp[2] = s.sp / s.n
     s.bdp[2] = s.sg / s.n
     s.bt[2] = s.st / s.n
+    follow_roughness(s, c)
     s.run += 1
     whole: bool = s.run >= 3
     return whole
@@ -170,13 +190,14 @@ def table_force(s: State, c: SignatureSettings, x: float, dp: float) -> float:
 
 
 @jit
-def regressor(s: State, c: SignatureSettings, slow: float) -> None:
+def regressor(s: State, c: SignatureSettings, slow: float, sticky: bool) -> None:
     """
     Fill the regressor of the model and of every hypothesis.
 
     :param s: state record: x, v and the middle block are read, ph is written.
     :param c: settings record.
     :param slow: share of the Stribeck friction at this speed.
+    :param sticky: the stem stuck and slipped within the block.
     """
     x = s.block.x
     dp = s.bdp[1]
@@ -186,13 +207,14 @@ def regressor(s: State, c: SignatureSettings, slow: float) -> None:
     ph[X1] = x + c.preload
     ph[ONE] = 1.0
     ph[V] = s.block.v
-    ph[SIGN] = 1.0 if s.block.v > 0.0 else -1.0
+    sign = 1.0 if s.block.v > 0.0 else -1.0
+    ph[SIGN] = sign * (1.0 + STICKING) if sticky else sign
     ph[TABLE : TABLE + N_TABLE] = 0.0
     i, share = table_node(x)
     ph[TABLE + i] = (1.0 - share) * dp * gain
     ph[TABLE + i + 1] = share * dp * gain
     ph[LAG] = gain * (s.bdp[2] - s.bdp[0]) / (s.bt[2] - s.bt[0])
-    ph[STRIBECK] = ph[SIGN] * slow
+    ph[STRIBECK] = sign if sticky else sign * slow
     ph[SIGN_T] = 0.0
     ph[X1_T] = 0.0
     ph[PB] = s.bp[1]
@@ -245,8 +267,11 @@ def judge_block(s: State, c: SignatureSettings) -> None:
         s.block.moving = 1
         s.slide += 1
         slow = math.exp(-((v / c.v_stribeck) ** 2))
-        s.block.w = 1.0 / (1.0 + c.stribeck_weight * slow)
-        regressor(s, c, slow)
+        sticky = sticks(s, c, v)
+        doubtful = STICKY_DOUBT if sticky else 0.0
+        s.block.w = 1.0 / (1.0 + max(c.stribeck_weight * slow, doubtful))
+        s.block.age = s.block.w if sticky else 1.0
+        regressor(s, c, slow, sticky)
         return
     s.slide = 0
     if in_range and abs(v) < c.v_min and max(abs(d1), abs(d2)) < 3.0 * step:

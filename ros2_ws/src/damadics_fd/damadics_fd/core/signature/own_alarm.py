@@ -19,11 +19,13 @@ from damadics_fd.core.signature.phase import enter
 from damadics_fd.core.signature.settings import SignatureSettings
 from damadics_fd.core.signature.size import MODEL_FRICTION, MODEL_SPRING, at_most, joint_change
 from damadics_fd.core.signature.state import (
+    CAUSE_ELASTIC,
     CAUSE_FRICTION_DOWN,
     CAUSE_FRICTION_UP,
     CAUSE_SPRING_SOFTER,
     CAUSE_SPRING_STIFFER,
     CAUSE_SUPPLY,
+    CAUSE_UNCONFIRMED,
     CAUSE_UNDETERMINED,
     FAMILY_UNCONFIRMED,
     FAMILY_UNDETERMINED,
@@ -177,6 +179,25 @@ def persists(s: State, c: SignatureSettings) -> bool:
 
 
 @jit
+def joint_material(s: State, c: SignatureSettings, share: float) -> bool:
+    """
+    Tell whether a change without a name matters, by spring, preload and friction together.
+
+    Temperature changes several at once, so that none of them explains the evidence alone.
+
+    :param s: state record.
+    :param c: settings record.
+    :param share: of a material change.
+    :return: False while the long record since the alarm has no estimate.
+    """
+    if s.now_t <= s.alarm_t:
+        return False
+    spring = max(abs(s.now[0]), abs(s.now[1]) / c.force_scale) / c.material_spring
+    friction = abs(s.now[2]) / c.material_friction
+    return bool(max(spring, friction) >= share)
+
+
+@jit
 def material(s: State, c: SignatureSettings, before: bool) -> bool:
     """
     Tell whether the present change matters for maintenance.
@@ -187,15 +208,16 @@ def material(s: State, c: SignatureSettings, before: bool) -> bool:
     :return: False for a named friction or spring change that is certainly small, and of the own
         alarm until the size is known.
     """
-    if s.cause == CAUSE_UNDETERMINED and s.own != 0:
-        return bool((s.t - s.alarm_t) * 1e-9 >= c.unconfirmed_after)
+    share = HYSTERESIS if before else 1.0
+    if s.own != 0 and s.cause in (CAUSE_UNDETERMINED, CAUSE_UNCONFIRMED):
+        return joint_material(s, c, share)
     if math.isnan(s.cause_value):
         return True
-    share = HYSTERESIS if before else 1.0
     if s.cause in (CAUSE_FRICTION_UP, CAUSE_FRICTION_DOWN):
         most = at_most(s.cause_value, s.cause_std, MODEL_FRICTION)
         return bool(most >= share * c.material_friction)
-    if s.cause in (CAUSE_SPRING_STIFFER, CAUSE_SPRING_SOFTER):
+    spring = s.second if s.cause == CAUSE_ELASTIC else s.cause
+    if spring in (CAUSE_SPRING_STIFFER, CAUSE_SPRING_SOFTER):
         most = at_most(s.cause_value, s.cause_std, MODEL_SPRING)
         return bool(most >= share * c.material_spring)
     return True

@@ -17,17 +17,18 @@ def enter(s: Phase, state: int, t: int) -> None:
     """
     s.state = state
     s.since = t
-    s.n_moving = 0
+    s.n_moving = 0.0
 
 
 @jit
-def count_moving(s: Phase) -> None:
+def count_moving(s: Phase, weight: float) -> None:
     """
     Count a moving block.
 
     :param s: state record.
+    :param weight: of it, at most 1.
     """
-    s.n_moving += 1
+    s.n_moving += weight
 
 
 @jit

@@ -25,7 +25,7 @@ class SignatureSettings(Section):
     The geometry describes the valve, the rest follows the rules in docs/signature.md.
     """
 
-    DERIVED: ClassVar[tuple[str, ...]] = ('block_ns', 'min_samples')
+    DERIVED: ClassVar[tuple[str, ...]] = ('block_ns', 'min_samples', 'carried')
 
     # geometry; defaults: DAMADICS actuator
     force_scale: float = VALVE.force_scale  # [N] FN = K L
@@ -57,6 +57,7 @@ class SignatureSettings(Section):
     plug_floor: float = 0.0002
     lag_std: float = 0.05  # [s] prior of the lag between P1 - P2 and position
     stribeck_std: float = 0.01  # [1] prior of the friction that vanishes with speed
+    ps_lag: float = 0.0  # [s] of the chamber pressure, to which position and P1 - P2 were delayed
     ps_lag_std: float = 0.0  # [s] how well the lag of the chamber pressure is known
     size_weight: float = 5000.0  # blocks that the unit of a size rests on in the end
     sigma_min: float = 4e-4  # [1]
@@ -85,7 +86,7 @@ class SignatureSettings(Section):
     material_spring: float = 0.02
     # supply pressure from the top speed
     supply_pressure: float = VALVE.supply_pressure  # [Pa]
-    material_supply: float = 0.1  # [1] loss of the top filling rate
+    material_supply: float = 0.13  # [1] loss of supply pressure, as a share
     chamber_volume: float = VALVE.chamber_volume  # [m3] dead volume V0
     stroke: float = VALVE.stroke  # [m]
     # NAMUR NE 107 class of each of CAUSES
@@ -118,6 +119,7 @@ class SignatureSettings(Section):
             learn=c.t_learn,
             plug_gain_std=c.plug_gain_std,
             plug_shape_std=c.plug_shape_std,
+            ps_lag=c.ps_lag,
             ps_lag_std=c.ps_lag_std,
             material_friction=c.material_friction,
             material_spring=c.material_spring,
@@ -136,6 +138,11 @@ class SignatureSettings(Section):
     def min_samples(self) -> int:
         """Samples that make a block whole."""
         return max(1, math.ceil(0.75 * self.block / self.sample_period - 1e-9))
+
+    @property
+    def carried(self) -> float:
+        """Share of a slip's variance that the delay carries into the next block."""
+        return math.exp(-self.block / self.ps_lag) if self.ps_lag > 0.0 else 0.0
 
     def problems(self) -> list[str]:
         """

@@ -100,7 +100,7 @@ class Phase(Record):
 
     state: int  # a STATE constant
     since: int  # [ns] of it
-    n_moving: int  # moving blocks judged since then
+    n_moving: float  # moving blocks judged since then, sticky ones by their weight
 
 
 class Blocks(Record):
@@ -113,6 +113,12 @@ class Blocks(Record):
     sp: float
     sg: float
     st: float
+    sr: float
+    srr: float
+    srt: float
+    stt: float
+    late_x: float  # the newest position and its time
+    late_t: float
     run: int  # whole blocks in a row
     slide: int  # moving blocks in a row
     bx: Annotated[Floats, 3]  # position
@@ -120,6 +126,8 @@ class Blocks(Record):
     bp: Annotated[Floats, 3]  # chamber pressure, as a force / FN
     bdp: Annotated[Floats, 3]  # [Pa] P1 - P2
     bt: Annotated[Floats, 3]  # [s] since t0
+    br: Annotated[Floats, 3]  # variance of the position about a straight motion
+    noise: float  # what of it is noise: the lower quartile of all blocks
 
 
 class Reference(Record):
@@ -240,6 +248,7 @@ class Block(Record):
 
     moving: int
     standing: int
+    age: float  # by which it ages the memories: its weight where the stem sticks, else 1
     x: float
     u: float
     v: float

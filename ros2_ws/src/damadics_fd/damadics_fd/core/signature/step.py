@@ -221,11 +221,11 @@ def monitor_block(s: State, c: SignatureSettings) -> bool:
     for m in range(SET_SLOW + 1):
         if m == SET_SLOW and s.stage2 == STAGE2_STRONG and s.slide <= BREAK_AWAY:
             continue
-        accumulate(s, m, 1.0 - 1.0 / c.memory[m], r)
-    count_moving(s)
+        accumulate(s, m, 1.0 - s.block.age / c.memory[m], r)
+    count_moving(s, s.block.age)
     if s.state == STATE_ALARM:
         let_grow(s, growth_time(s))
-        accumulate(s, SET_ALARM, 1.0 - 1.0 / c.memory[SET_ALARM], r)
+        accumulate(s, SET_ALARM, 1.0 - s.block.age / c.memory[SET_ALARM], r)
         count_block(s)
         return True
     if s.state == STATE_VERIFY:

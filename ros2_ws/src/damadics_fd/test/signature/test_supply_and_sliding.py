@@ -1,0 +1,86 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""What strokes tell of the air supply, and stairs of a stem that sticks and slips."""
+
+import numpy as np
+import pytest
+from damadics_fd.core.signature import air, sliding
+from damadics_fd.core.signature.settings import SignatureSettings
+from damadics_fd.core.signature.state import FILL, STROKES, VENT, State
+
+SUPPLY, ATM = 6e5, 101325.0
+
+
+def strokes(law, now: float, at: float) -> tuple[State, SignatureSettings]:
+    """Return rates learned at 600 kPa and taken at another supply, of a given law of flow."""
+    state, settings = State.rows(), SignatureSettings().record()
+    s, c = state[0], settings[0]
+    for way in (FILL, VENT):
+        s.air_learned[way], s.air_count[way] = STROKES, STROKES
+        s.air_rate[way], s.air_rate_ps[way] = 1.0, at
+    s.air_rate[FILL] = law(now, at) / law(SUPPLY, at)
+    return s, c
+
+
+def root(supply: float, ps: float) -> float:
+    return float(np.sqrt(supply - ps))
+
+
+def iso(supply: float, ps: float) -> float:
+    return float(np.sqrt(air.flow_square(ATM + supply, ATM + ps)))
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize('law', [root, iso])
+@pytest.mark.parametrize('ps', [5e4, 1.5e5, 3e5])
+def test_a_loss_of_a_tenth_is_no_alarm_whatever_the_law_of_the_flow(law, ps):
+    s, c = strokes(law, 0.9 * SUPPLY, ps)
+    assert air.supply_change(s, c) == pytest.approx(-0.1 * SUPPLY, abs=1.6e4)
+    assert not air.supply_lost(s, c)
+    s, c = strokes(law, 5e5, ps)
+    assert air.supply_change(s, c) == pytest.approx(-1e5, abs=2.5e4)
+    assert air.supply_lost(s, c)
+    s.air_rate[VENT] = 1.2  # a leak vents faster
+    assert not air.supply_lost(s, c)
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize('up', [7e5, 3e5])
+@pytest.mark.parametrize('down', [1e5, 2e5, 2.5e5])
+def test_the_flow_law_is_inverted(up, down):
+    assert air.supply_of(air.flow_square(up, down), down) == pytest.approx(up, rel=1e-9)
+
+
+@pytest.mark.plain
+def test_a_spike_and_a_short_stroke_do_not_move_the_rate():
+    values = np.array([0.7, 1.0, 0.98, 3.0, 0.99])
+    assert values[air.second_best(values, 5)] == 1.0
+    assert air.second_best(values, 1) == 0
+
+
+@pytest.mark.parametrize('lag', [0.0, 0.1])
+def test_stairs_are_told_from_an_even_motion(lag):
+    """The stem goes a fifth of its stroke a second, evenly and then by stairs of 1.3 %."""
+    from damadics_fd.core.approximator.transmitter import delay_column
+    from damadics_fd.core.signature.blocks import add_sample, close_block, open_block
+
+    settings = SignatureSettings(ps_lag=lag).record()
+    state = State.rows()
+    s, c = state[0], settings[0]
+    t = np.arange(800) * 0.005
+    even = 0.1 + 0.2 * t
+    x = np.where(t < 2.0, even, np.floor(even / 0.013) * 0.013)
+    x = x + 3e-4 * np.random.default_rng(1).standard_normal(len(t))
+    if lag:
+        x = delay_column(x, np.full(len(t), 0.005), lag)
+    told = []
+    s.index = -1
+    for k in range(len(t)):
+        index = int(t[k] / 0.1 + 1e-9)
+        if index != s.index:
+            if s.index >= 0 and close_block(s, c):
+                told.append(sliding.sticks(s, c, 0.2))
+            open_block(s, index)
+        add_sample(s, c, t[k], x[k], 1e5, 1e6)
+    assert not any(told[3:17])
+    assert all(told[22:])
