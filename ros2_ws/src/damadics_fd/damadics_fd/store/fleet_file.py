@@ -69,7 +69,8 @@ def read_fleet(path: Path | str) -> list[Valve]:
     """
     path = Path(path)
     try:
-        content = yaml.load(path.read_text(), _LOADER)
+        text = path.read_text()
+        content = yaml.load(text, Loader=_LOADER)
     except OSError as problem:
         raise FleetError(f'{path}: {problem.strerror}') from problem
     except yaml.YAMLError as problem:
