@@ -118,3 +118,33 @@ def test_a_gap_is_no_change_from_one_sample_to_the_next(followed):
     before = float(monitor.state.rough[0, 0])
     monitor.run_samples(rows[300:301] + np.array([0, 0, 0.5, 0, 0, 0, 0]))
     assert float(monitor.state.rough[0, 0]) == before
+
+
+@pytest.mark.parametrize('law', [False, True])
+def test_a_record_with_gaps_can_be_learned_from(law):
+    """Also one that leaves a few samples between two gaps."""
+    rows = driven(500, seed=13)
+    if law:
+        rows[:, F] *= 0.5
+    for start, seconds in ((100, 40), (150, 35), (300, 60)):
+        rows = without(rows, start, seconds)
+    rows[-40:, P1] = math.nan
+    rows[20, (P2, T1)] = math.nan
+    reference = learn(rows, SETTINGS, math.inf)
+    fresh = driven(300, seed=14)
+    if law:
+        fresh[:, F] *= 0.5
+    fresh[200:, X] += 0.05
+    trace = ScadaMonitor(SETTINGS, reference).run_samples(fresh)
+    assert 200 <= trace['t'][trace['alarm']][0] <= 203
+
+
+def test_a_command_that_was_missed_for_one_sample_raises_nothing(followed):
+    """The stem follows it all the same: a quick one is elsewhere than between its neighbours."""
+    rows = following(AT + 30, seed=8)
+    for i in range(AT, AT + 24, 6):
+        rows[i, CV] += 0.15
+        rows[i + 2, X] += 0.15
+        rows[i + 3, X] += 0.05
+    trace = ScadaMonitor(SETTINGS, followed).run_samples(np.delete(rows, range(AT, AT + 24, 6), 0))
+    assert not trace['alarm'].any()

@@ -7,11 +7,19 @@ import math
 import numpy as np
 
 from damadics_fd.core.scada.judging.cusum import R1
+from damadics_fd.core.scada.judging.gap import GAP_PERIODS
 from damadics_fd.core.scada.judging.limits import friction_limit, is_stationary, set_limits
 from damadics_fd.core.scada.judging.pressure import learn_pressure
 from damadics_fd.core.scada.judging.roughness import usual_roughness
 from damadics_fd.core.scada.laws.choose_flow import choose_flow, slow_sigma
-from damadics_fd.core.scada.laws.clean import despiked, is_regular, period_of, spike_sizes, split
+from damadics_fd.core.scada.laws.clean import (
+    despiked,
+    is_regular,
+    period_of,
+    spike_sizes,
+    split,
+    worthwhile,
+)
 from damadics_fd.core.scada.laws.fit_stem import Piece, StemFit, fit_stem
 from damadics_fd.core.scada.laws.plausible import LearningError, check_stem
 from damadics_fd.core.scada.laws.robust import Floats, huber_weights, loss_of
@@ -64,6 +72,8 @@ def learn(
     """
     t = samples[:, T] - samples[0, T]
     window = (t >= settings.learn_from_s) & (t < (settings.learn_s if until is None else until))
+    gap = max(settings.gap_s, GAP_PERIODS * period_of(samples[:, T]))
+    window[window] = worthwhile(t[window], gap)
     n = int(window.sum())
     if n < LEAST_SAMPLES:
         raise LearningError(
@@ -116,7 +126,7 @@ def learn(
 def _pieces(part: Floats, settings: ScadaSettings, period: float) -> list[Piece]:
     return [
         Piece(piece[:, T], piece[:, CV], piece[:, X])
-        for piece in split(part, max(settings.gap_s, 5.0 * period))
+        for piece in split(part, max(settings.gap_s, GAP_PERIODS * period))
     ]
 
 

@@ -15,6 +15,7 @@ from damadics_fd.core.scada.state import LAW, MonitorState, Reference
 
 FORGET_S = 300.0
 SETTLING_PERIODS = 10.0
+MISSED = 1.5  # periods: one sample of CV at least is missing, which a law follows at once
 GAP_PERIODS = 5.0  # sample periods without a sample that are no gap yet
 
 
@@ -49,11 +50,18 @@ def begin_again(s: MonitorState, cfg: ScadaConfig, ref: Reference, t: float) -> 
 
 
 @jit
+def missing(ref: Reference, periods: float) -> bool:
+    """Tell whether so much is missing before a sample that the stem's model may be off."""
+    enough = MISSED if ref.stem_kind == LAW else GAP_PERIODS
+    return periods > enough
+
+
+@jit
 def bridge(s: MonitorState, ref: Reference, t: float) -> None:
     """Make no test of r1 for a while after t: which way CV went since the last sample is open."""
     wait = SETTLING_PERIODS * ref.period
     if ref.stem_kind == LAW:
-        wait = 3.0 * ref.period + ref.stem_law.dead_s + 5.0 * ref.stem_law.lag_s
+        wait = ref.period + ref.stem_law.dead_s + 4.0 * ref.stem_law.lag_s
     s.t_stem = max(s.t_stem, t + wait)
     break_off(s)
 

@@ -10,6 +10,7 @@ from damadics_fd.core.scada.judging.gap import (
     SETTLING_PERIODS,
     begin_again,
     bridge,
+    missing,
     restart,
 )
 from damadics_fd.core.scada.judging.pressure import (
@@ -135,7 +136,7 @@ def predict(
     elif t - s.t > max(cfg.gap_s, GAP_PERIODS * ref.period):
         begin_again(s, cfg, ref, t)
         restart(s, cfg, ref, t, cv, x, p1, p2)
-    elif ref.regular and t - s.t > GAP_PERIODS * max(cfg.period_s, ref.period):
+    elif ref.regular and missing(ref, (t - s.t) / max(cfg.period_s, ref.period)):
         bridge(s, ref, t)
     watch_period(s, cfg, ref, t)
     entry = s.history[s.samples % HISTORY_LENGTH]

@@ -5,11 +5,13 @@
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
 from damadics_fd.core.scada.laws.robust import Floats, spread_of
 
 ISOLATED = 8.0  # sigma of the change from sample to sample
 ALIKE, MOST = 0.2, 0.9  # share of the period, share of the samples
+LEAST_PART = 20  # samples between two gaps
 MEASURED = (2, 3, 4, 5, 6)  # columns that a transmitter sends; CV is what was commanded
 
 
@@ -58,9 +60,13 @@ def is_regular(t: Floats) -> bool:
     return bool(len(t) > 1 and np.mean(np.abs(between / np.median(between) - 1.0) < ALIKE) > MOST)
 
 
+def worthwhile(t: Floats, gap: float) -> NDArray[np.bool_]:
+    """Tell which samples lie in parts between gaps, s, that are worth learning from."""
+    parts = np.split(np.arange(len(t)), np.flatnonzero(np.diff(t) > gap) + 1)
+    return np.concatenate([np.full(len(part), len(part) >= LEAST_PART) for part in parts])
+
+
 def split(samples: Floats, gap: float) -> Iterator[Floats]:
-    """Yield the parts of a record between gaps, s, that are worth learning from."""
+    """Yield the parts of a record between gaps, s."""
     cuts = np.flatnonzero(np.diff(samples[:, 0]) > gap) + 1
-    for part in np.split(samples, cuts):
-        if len(part) >= 20:
-            yield part
+    yield from np.split(samples, cuts)
