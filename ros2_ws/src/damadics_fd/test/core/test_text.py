@@ -4,12 +4,13 @@
 
 import pytest
 from damadics_fd.core.text import plain
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 pytestmark = pytest.mark.plain
 
 
+@settings(deadline=None)  # a busy machine pauses longer than one example may take
 @given(st.text(st.characters(codec=None), max_size=500), st.integers(2, 50))
 def test_any_text_becomes_a_short_printable_line(text, limit):
     line = plain(text, limit)

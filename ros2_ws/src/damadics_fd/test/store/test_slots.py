@@ -7,7 +7,7 @@ import os
 
 import pytest
 from damadics_fd.store.slots import check_folder, read_slots, set_aside, write_slot
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 KIND = 'damadics_fd test 1'
@@ -32,6 +32,7 @@ def test_both_slots_hold_the_newest_where_it_matters(tmp_path):
     assert sorted(p.name for p in tmp_path.iterdir()) == ['v.a.json', 'v.b.json']
 
 
+@settings(deadline=None)  # a busy machine pauses longer than one example may take
 @given(st.data())
 def test_any_damage_is_noticed(tmp_path_factory, data):
     path = tmp_path_factory.mktemp('slots') / 'v'
