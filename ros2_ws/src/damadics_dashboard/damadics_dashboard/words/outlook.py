@@ -5,8 +5,8 @@
 import math
 from collections.abc import Sequence
 
-from damadics_fd.core.signature.trend import Trend, fit_recent
 from damadics_fd.store.intervals import Series
+from damadics_fd.store.trend_fit import Trend, fit_recent
 
 from damadics_dashboard.words.texts import Texts
 

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damadics_fd.core.record import Saved
-from damadics_fd.core.signature.trend import TimeToLimit, Trend, fit_recent
 from damadics_fd.store.file_names import file_name
 from damadics_fd.store.slots import read_bounded, replace_file, set_aside
+from damadics_fd.store.trend_fit import TimeToLimit, Trend, fit_recent
 
 QUANTITIES = ('spring', 'preload', 'friction')
 COLUMNS = 'stamp_ns,' + ','.join(f'{q},{q}_std' for q in QUANTITIES) + ',reference'

@@ -5,7 +5,7 @@ import os
 
 import numpy as np
 import pytest
-from damadics_fd.core.signature.trend import fit_line, fit_recent
+from damadics_fd.store.trend_fit import fit_line, fit_recent
 from damadics_fd.store.trends import TrendFile
 
 DAY = 86400.0
