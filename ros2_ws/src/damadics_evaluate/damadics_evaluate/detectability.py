@@ -200,5 +200,12 @@ def draw(rows: list[Row], path: Path) -> None:
             missed = side & ~np.isfinite(y)
             axis.loglog(x[missed], np.full(missed.sum(), AFTER), mark, mfc='none', color='0.5')
         axis.set(title=quantity, xlabel='change [%]', ylabel='delay [s]; open: not found')
+        sizes = sorted(set(x.tolist()))
+        axis.set_xticks(sizes, [f'{size:g}' for size in sizes])  # and no powers of ten between
+        axis.set_xticks([], minor=True)
+        axis.set_ylim(0.07, 1.5 * AFTER)
+        axis.yaxis.set_major_formatter('{x:g}')
+        axis.yaxis.set_minor_formatter('')
+        axis.grid(alpha=0.3)
         axis.legend()
     figure.savefig(path, dpi=110)

@@ -108,7 +108,8 @@ class Plant(SpinnableNode):
             self._tick_length, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME)
         )
         self.get_logger().info(
-            f'{scenario}, model {model}, {rate:g} Hz, real-time factor {self._factor:g}'
+            f'{scenario}, {f"valve {valve}" if valve else f"model {model}"}, {rate:g} Hz, '
+            f'real-time factor {self._factor:g}'
         )
 
     def _tick(self) -> None:

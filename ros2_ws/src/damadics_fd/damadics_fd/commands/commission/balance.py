@@ -35,6 +35,7 @@ from damadics_fd.commands.commission.regression import (
 from damadics_fd.commands.commission.signals import Blocks, Signals, blocks
 from damadics_fd.core.record import Floats
 from damadics_fd.core.settings import Settings
+from damadics_fd.core.signature.sliding import STICKING
 
 BLOCK = 0.1  # s
 SAME_LAG = 0.003  # s
@@ -55,7 +56,7 @@ class Balance:
     lag: Lag
     viscous: float  # c [N s/m]
     friction: float  # dry, Fc [N]
-    stribeck: float  # how much more at rest [N]
+    stribeck: float  # how much more where the stem is slow or sticks and slips [N]
     covariance: Floats  # of K, b, c, Fc
     misfit: float  # standard deviation of the force left over [N]
     noise: float  # the part of it that sensors explain [N]
@@ -273,7 +274,7 @@ def _final(
         lag,
         viscous,
         abs(dry),
-        max(slow, 0.0),
+        max(slow + (STICKING * abs(dry) if np.any(b.sticky[use]) else 0.0), 0.0),
         fit.covariance[: S + 1, : S + 1],
         fit.sigma,
         sensors,

@@ -178,6 +178,8 @@ def main(args: list[str] | None = None) -> int:
             print(line)
         if options.out:
             print(f'written: {options.out}')
+        if options.twin:
+            print(f'twin: {options.twin}')
     except (BagError, CommissioningError, SettingsError, KeyError, OSError, ValueError) as error:
         print(f'commission: {error}', file=sys.stderr)
         return FAILED

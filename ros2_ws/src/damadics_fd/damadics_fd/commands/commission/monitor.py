@@ -288,7 +288,7 @@ def report(proposal: Proposal) -> Iterator[str]:
     )
     yield (
         f'dry friction {b.friction:.1f} +- {2 * b.friction_std:.1f} N, viscous {b.viscous:.0f} +- '
-        f'{2 * b.viscous_std:.0f} N s/m, {b.stribeck:.1f} N more at rest; the force balance '
+        f'{2 * b.viscous_std:.0f} N s/m, {b.stribeck:.1f} N more where it sticks; the balance '
         f'leaves {b.misfit:.1f} N ({100.0 * b.misfit / max(b.total, 1e-9):.0f} % of the friction)'
     )
     if s.plug_diameter > 0.0:
