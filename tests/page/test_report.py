@@ -7,6 +7,7 @@ import io
 import math
 import resource
 import time
+from datetime import datetime
 
 import pytest
 from damadics_dashboard.report.command import main
@@ -92,7 +93,26 @@ def test_a_valve_year_tells_cause_size_dates_and_who_did_what(year, tmp_path, ca
         csv.DictReader(io.StringIO((tmp_path / 'report_lv101.csv').read_text('utf-8-sig')))
     )
     assert [row['cause'] for row in rows] == ['friction_up', '', '', '']
-    assert len(lines) == 3
+    assert [line.rpartition('.')[2] for line in lines] == ['html', 'pdf', 'csv', 'csv']
+
+
+def test_trends_for_a_spreadsheet_have_units_and_times(year, tmp_path):
+    assert report(year, tmp_path, 'lv101', '--as', 'csv') == 0
+    text = (tmp_path / 'report_lv101_trends.csv').read_text('utf-8-sig')
+    rows = list(csv.DictReader(io.StringIO(text)))
+    assert {row['quantity']: row['unit'] for row in rows} == {
+        'spring': '%', 'preload': 'N', 'friction': '%',
+    }  # fmt: skip
+    friction = [row for row in rows if row['quantity'] == 'friction']
+    assert len(friction) >= 364
+    times = [datetime.fromisoformat(row['time']).timestamp() for row in friction]
+    assert times == sorted(times) and BEGIN - DAY <= times[0] <= BEGIN + DAY
+    for time_of, row in zip(times, friction, strict=True):
+        middle = time_of + float(row['length_s']) / 2
+        assert float(row['mean']) == pytest.approx(165.0 * (middle - BEGIN) / (365 * DAY), abs=1.0)
+        assert float(row['least']) <= float(row['mean']) <= float(row['greatest'])
+    assert report(year, tmp_path, 'FLEET', '--as', 'csv') == 0
+    assert not (tmp_path / 'report_FLEET_trends.csv').exists(), 'a fleet has none of its own'
 
 
 def test_the_fleet_lists_the_worst_first_and_counts_by_eemua(year, tmp_path):

@@ -15,10 +15,14 @@ from dataclasses import dataclass, field
 
 from damadics_fd.core.sample import SIGNALS
 
+from damadics_connect.lately import Lately
+
 NANO = 1_000_000_000
 DRIFT = 200e-6  # of the source's clock against ours
 STEP = NANO  # ns; stamps further back than this may be a clock set back, others are only late
-LONGEST_FILL = 2 * NANO  # ns, or three periods: a longer pause is a gap, not a hold
+LONGEST_FILL = 3 * NANO  # ns, or three periods: a longer pause is a gap, not a hold
+LATE = 10 * NANO  # ns for which it is remembered how late changes have come
+MOST_LATE = 5 * NANO // 2  # ns that held samples wait for late changes
 DAY = 86_400 * NANO
 WAIT = 2 * NANO  # ns for the first values of all signals
 FIRST_HOLD = 3 * NANO // 10  # ns without a change before the first held sample: a source that
@@ -60,6 +64,7 @@ class Joiner:
         self._settle = settle
         self._first_hold = max(settle, FIRST_HOLD)
         self._holding = False  # the last sample was a held one
+        self._late = Lately(LATE)
         self._step = max(STEP, 3 * period)
         self._emit = emit
         self._expected = sum(1 << slot for slot in signals)
@@ -162,33 +167,36 @@ class Joiner:
         if self._mask == self._expected:
             self._close(now)
 
-    def look(self, now: int) -> None:
+    def look(self, now: int, known: int | None = None) -> None:
         """
         Emit what is due; call it often, and only while the source is alive.
 
         :param now: [ns].
+        :param known: up to when all changes have come [ns]; None: up to now.
         """
-        if self._group and now - self._opened >= self._settle:
+        known = now if known is None else known
+        if self._group and known - self._opened >= self._settle:
             self._close(now)
         if self._group or not self._complete(now) or self._ahead is None:
             return
-        due = self._due(now, self._ahead)
+        due = self._due(known, self._ahead)
         if not self._last or due - self._last > max(LONGEST_FILL, 3 * self._period):
             newest = max(self._times)
             if newest > due:
                 due = newest
             if due > self._last:
                 self._tell_gap(due)
-                self._send(due, now, held=due != newest)
+                self._send(due, known, held=due != newest)
             return
         while self._last <= due:
-            self._send(self._last + self._period, now, held=True)
-            due = self._due(now, self._ahead)
+            self._send(self._last + self._period, known, held=True)
+            due = self._due(known, self._ahead)
 
-    def _due(self, now: int, ahead: int) -> int:
+    def _due(self, known: int, ahead: int) -> int:
         """Return the stamp after which a held sample is due."""
-        rests = self._holding or not self._last
-        return now + ahead - self._period - (self._settle if rests else self._first_hold)
+        wait = self._settle if self._holding or not self._last else self._first_hold
+        late = min(self._late.largest(known), MOST_LATE)
+        return known + ahead - self._period - max(wait, late)
 
     def _close(self, now: int) -> None:
         """End the present sample: fill the time before it, apply it, send it."""
@@ -209,6 +217,7 @@ class Joiner:
         self._mask = 0
         if self._first and now + self._ahead - end > self._period + self._settle:
             return  # a value of long ago, as every session begins with: it is held from now on
+        self._late.take(now + self._ahead - end, now)
         if complete and end > self._last:
             if self._last:
                 self._tell_gap(end)

@@ -126,6 +126,25 @@ def test_a_source_that_is_held_up_for_less_than_a_third_of_a_second_loses_nothin
     assert [values[X1] for _, values in rig.rows] == list(range(1, 500))
 
 
+@pytest.mark.parametrize('heap', [0.5, 1.0, 1.8])
+def test_a_device_that_tells_in_heaps_is_waited_for_once_that_is_known(heap):
+    """A gateway hands on what it has gathered; the first heap is not expected, all others are."""
+    rig = Rig(period=0.02, settle=0.08)
+    gathered = []
+    for n in range(1, 2000):
+        rig.now = 5 * NANO + n * NANO // 50
+        gathered.append(n)
+        if n % round(50 * heap) == 0:
+            for k in gathered:
+                for slot in (CV, X1, P1):
+                    rig.joiner.take(slot, DAY0 + k * NANO // 50, float(k), rig.now)
+            gathered.clear()
+        rig.joiner.look(rig.now)
+    rows = rig.rows[round(100 * heap) :]
+    assert len(rows) > 1700
+    assert [values[X1] for _, values in rows] == [(stamp - DAY0) * 50 / NANO for stamp, _ in rows]
+
+
 def test_a_new_session_doubles_no_sample_and_names_the_gap():
     rig = Rig()
     for t in range(3):

@@ -85,6 +85,38 @@ def test_a_server_or_receiver_that_is_held_up_costs_no_sample_and_makes_none_up(
     assert (np.diff(rig.kept.stamps) > 0).all()
 
 
+@pytest.mark.parametrize('stall', [0.4, 1.0, 2.0])
+def test_a_server_that_catches_up_message_by_message_has_nothing_held_in_between(stall):
+    """After it stood still its first messages are empty, or hold only a part of what is due."""
+    rig = Rig(0.02)
+    n, put = 1, 0.0
+    for cycle in range(1, 1500):
+        put += 0.02 + (stall if cycle in (200, 900) else 0.0)
+        most = 0 if cycle in (200, 201, 900) else 8
+        due = []
+        while 0.02 * n <= put - 0.001 and len(due) < most:
+            due.append(0.02 * n)
+            n += 1
+        rig.message(put + 0.002, put, *due)
+    assert n > 1400
+    stamps = [DAY0 + round(0.02 * k * NANO) for k in range(1, n)]
+    assert rig.kept.stamps.tolist() == stamps
+    assert [values[X1] for _, values in rig.kept.rows] == [0.02 * k for k in range(1, n)]
+
+
+def test_a_valve_at_rest_is_held_again_after_a_stall_without_a_gap():
+    rig = Rig(0.02)
+    rig.message(0.1, 0.1, 0.1)
+    puts = [0.1 * k for k in range(2, 30)] + [4.9 + 0.1 * k for k in range(150)]
+    for put in puts:
+        rig.message(put, put)
+    rig.message(puts[-1] + 0.1, puts[-1] + 0.1, puts[-1] + 0.05, value=7.0)
+    assert set(np.diff(rig.kept.stamps)) <= {NANO // 50, 3 * NANO // 100}
+    assert rig.kept.rows[-1][1][X1] == 7.0
+    before = [row for row in rig.kept.rows if row[1][X1] != 7.0]
+    assert len(before) > 50 * (puts[-1] - 0.6)
+
+
 def test_a_value_that_does_not_change_is_held_as_far_as_the_server_has_spoken():
     rig = Rig(0.02)
     rig.message(0.1, 0.1, 0.1)

@@ -96,6 +96,8 @@ def test_campaign_refuses_what_it_does_not_know():
         Campaign(detectors=('magic',))
     with pytest.raises(ValueError, match='no scenario f3_S'):
         Campaign(scenarios=('f3_S',))
+    with pytest.raises(ValueError, match=r'no scenario f16_s: do you mean f16_S\?'):
+        Campaign(scenarios=('f16_s',))
     with pytest.raises(ValueError, match='debounce'):
         Campaign(debounce=0)
 

@@ -276,9 +276,9 @@ def found_by(ratio: float) -> str:
     """
     Say who found a change that the signature has a cause for.
 
-    :param ratio: largest residual / threshold of the fault.
+    :param ratio: largest residual / threshold of the fault; NaN where the threshold was 0.
     :return: one sentence.
     """
-    if ratio >= 1.0:
-        return 'Found by the threshold, named by the valve signature.'
-    return 'Found by the valve signature.'
+    if ratio < 1.0:
+        return 'Found by the valve signature.'
+    return 'Found by the threshold, named by the valve signature.'

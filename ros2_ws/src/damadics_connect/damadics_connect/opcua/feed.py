@@ -17,7 +17,7 @@ from damadics_connect.valve_list import ValveSource
 
 SHORTEST_INTERVAL, LONGEST_INTERVAL = 0.02, 0.5  # s between two messages of the server
 SOONEST_WORD, LATEST_WORD = 0.1, 0.5  # s after which a server that has nothing new says so
-HELD_UP = 2.0  # s for which the server keeps values while it, the network or we are held up
+HELD_UP = 5.0  # s for which the server keeps values while it, the network or we are held up
 QUALITY = 0xC0000000  # the two bits of a status code that say good, uncertain or bad
 UNCERTAIN = 0x40000000
 OVERFLOW = 0x480  # of a data value: the server's queue was too short
@@ -27,7 +27,7 @@ class Options(NamedTuple):
     """How the server is asked."""
 
     interval: float = 0.0  # s between two messages of the server; 0: half the valve's period
-    queue: int = 0  # values kept for one message; 0: those of 2 s more
+    queue: int = 0  # values kept for one message; 0: those of 5 s more
     poll: bool = False  # read instead of subscribing
 
 
@@ -105,7 +105,8 @@ class Feed:
         :return: the time for `take` and `look` [ns].
         """
         self.heard = now / NANO
-        return self._horizon.heard(published if self.prompt else 0, now)
+        pace = int(self.patience * NANO)
+        return self._horizon.heard(published if self.prompt else 0, now, pace)
 
     def take(self, changes: Changes, wall: int, at: int) -> None:
         """
@@ -134,10 +135,11 @@ class Feed:
         """
         Emit what is due of every valve.
 
-        :param at: up to when all changes are known [ns].
+        :param at: as `hear` returned it, or the present [ns].
         """
+        known = self._horizon.known if self.prompt else at
         for joiner in self.joiners.values():
-            joiner.look(at)
+            joiner.look(at, known)
 
     def _judge(self, item: Item, status: int, value: float, kind: str) -> float:
         """Return a value by its quality: NaN for a bad one or for what is no number."""

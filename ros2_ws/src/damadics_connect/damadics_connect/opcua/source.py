@@ -28,7 +28,9 @@ from damadics_connect.settings import shown
 from damadics_connect.valve_list import ValveSource
 
 HELD_UP = 0.5  # s that our own process may be late before its lateness counts
-QUIET = 1.6  # s without a word, beside its usual time, after which the session counts as lost
+QUIET = 1.6  # s without a word, beside its usual time, after which the server counts as gone
+GIVE_UP = 5.0  # s without a word after which the session is ended: until then it may go on, and
+# what the server has kept of its changes with it
 PAUSES = (0.2, 0.5, 1.0, 2.0, 5.0)  # s before it is tried again
 AT_ONCE = 1000  # monitored items of one request
 CANNOT_SUBSCRIBE = (ua.uaerrors.BadServiceUnsupported, ua.uaerrors.BadNotImplemented)
@@ -65,6 +67,7 @@ class Source:
         self._feeds = [Feed(period, group, options, output) for period, group in by_period.items()]
         self._joiners = {n: joiner for feed in self._feeds for n, joiner in feed.joiners.items()}
         self._ended = False  # the server has ended a subscription
+        self._followed = False  # in this session
         self._fault = 'not connected yet'
         self._unknown: dict[str, str] = {}
         self._sessions = self._values = self._garbled = 0
@@ -73,6 +76,7 @@ class Source:
         """Follow the server for ever; connect again whenever it was lost."""
         failures = 0
         while True:
+            self._followed = False
             try:
                 # more patience each time: the server may only be slow
                 client = await open_session(self._endpoint, PATIENCE * 2 ** min(failures, 3))
@@ -85,8 +89,8 @@ class Source:
                 reason = str(problem)
             except (ua.UaError, OSError, TimeoutError) as problem:
                 reason = f'{shown(self._endpoint.url)}: {why(problem)}'
-            if not self._fault:
-                failures = 0  # it was followed until now
+            if self._followed:
+                failures = 0
             if reason != self._fault:
                 self._log(f'not connected: {reason}')
             self._fault = reason
@@ -117,7 +121,7 @@ class Source:
             feed.begin(time.monotonic_ns())
             if self._poll or not await self._subscribe(client, feed, spaces):
                 polled.append(asyncio.create_task(self._read_on(client, feed, spaces)))
-        self._fault = ''
+        self._followed, self._fault = True, ''
         self._log(f'connected to {shown(self._endpoint.url)}: {len(self._joiners)} valve(s)')
         if self._unknown:
             self._log(f'no such node: {some([f"{n} ({c})" for n, c in self._unknown.items()])}')
@@ -135,13 +139,7 @@ class Source:
                     raise SessionError(
                         f'{shown(self._endpoint.url)}: the server has ended our subscription'
                     )
-                for feed in self._feeds:
-                    silent = time.monotonic() - feed.heard
-                    if silent > QUIET + max(feed.interval, feed.patience):
-                        raise SessionError(
-                            f'{shown(self._endpoint.url)}: silent for {silent:.1f} s: server or '
-                            'network is gone'
-                        )
+                self._tell_silence()
                 for task in polled:
                     if task.done():
                         task.result()
@@ -153,6 +151,24 @@ class Source:
         finally:
             for task in polled:
                 task.cancel()
+
+    def _tell_silence(self) -> None:
+        """
+        Tell that the server has fallen silent, or speaks again.
+
+        :raises SessionError: where it has been silent for too long.
+        """
+        now, place = time.monotonic(), shown(self._endpoint.url)
+        silent = max(now - feed.heard - max(feed.interval, feed.patience) for feed in self._feeds)
+        reason = f'{place}: silent for {QUIET:g} s and more: server or network is gone'
+        if silent > GIVE_UP:
+            raise SessionError(reason)
+        if silent > QUIET and not self._fault:
+            self._fault = reason
+            self._log(f'not connected: {reason}')
+        elif silent <= QUIET and self._fault:
+            self._fault = ''
+            self._log(f'connected to {place} again')
 
     async def _subscribe(self, client: Client, feed: Feed, spaces: list[str]) -> bool:
         """Make the subscription of a feed; False where the server has none."""

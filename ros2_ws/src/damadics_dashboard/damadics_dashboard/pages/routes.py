@@ -20,7 +20,12 @@ from damadics_dashboard.words.texts import Texts, preferred, texts
 DAY = 86400.0
 LONGEST = 3660  # days
 FLEET = 'FLEET'
-KINDS = {'html': 'text/html', 'pdf': 'application/pdf', 'csv': 'text/csv'}
+KINDS = {
+    'html': 'text/html',
+    'pdf': 'application/pdf',
+    'csv': 'text/csv',
+    'trends': 'text/csv',
+}
 
 
 def add_routes(watcher: Watcher) -> None:
@@ -81,7 +86,10 @@ def _report(sources: content.Sources, name: str, days: int, kind: str, t: Texts)
         from damadics_dashboard.report.paper import pdf  # an extra, and slow to load
 
         body = pdf(report, t)
+    elif kind == 'html':
+        body = forms.html(report, t)
     else:
-        body = forms.html(report, t) if kind == 'html' else forms.text_csv(report)
-    file = f"inline; filename*=UTF-8''report_{quote(name or 'valve', safe='')}.{kind}"
+        body = forms.trends_csv(report) if kind == 'trends' else forms.text_csv(report)
+    end = '_trends.csv' if kind == 'trends' else f'.{kind}'
+    file = f"inline; filename*=UTF-8''report_{quote(name or 'valve', safe='')}{end}"
     return Response(body, media_type=KINDS[kind], headers={'content-disposition': file})

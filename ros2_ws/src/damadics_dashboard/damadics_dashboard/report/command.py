@@ -148,6 +148,10 @@ def write(options: argparse.Namespace, since: float, until: float) -> list[Path]
         else:
             path.write_text(forms.text_csv(report), 'utf-8-sig')
         written.append(path)
+        if form == 'csv' and report.trends:
+            path = path.with_name(f'{path.stem}_trends.csv')
+            path.write_text(forms.trends_csv(report), 'utf-8-sig')
+            written.append(path)
     return written
 
 

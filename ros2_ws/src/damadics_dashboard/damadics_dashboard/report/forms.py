@@ -4,11 +4,13 @@
 
 import csv
 import io
+import math
 from dataclasses import dataclass
+from datetime import UTC, datetime
 
 import numpy as np
 from damadics_fd.core.stamps import SECOND
-from damadics_fd.store.intervals import Series
+from damadics_fd.store.intervals import STATISTICS, Series
 from numpy.typing import NDArray
 
 from damadics_dashboard.report.content import Report
@@ -19,6 +21,7 @@ from damadics_dashboard.words.templates import render
 from damadics_dashboard.words.texts import Texts
 
 MOST_POINTS = 700  # of a drawn curve: more than the paper shows
+TREND_COLUMNS = ('quantity', 'unit', 'time', 'length_s', *STATISTICS, 'reference')
 Pair = tuple[float, float]
 
 
@@ -59,6 +62,29 @@ def text_csv(report: Report) -> str:
     table.writerow(COLUMNS)
     for event in report.events:
         table.writerow([cell(event.get(name)) for name in COLUMNS])
+    return stream.getvalue()
+
+
+def trends_csv(report: Report) -> str:
+    """
+    Return the trends of a report for a spreadsheet, a line for each interval.
+
+    :param report: the report.
+    :return: CSV with a line of names; times in UTC, values in the unit that is named.
+    """
+    stream = io.StringIO()
+    table = csv.writer(stream)
+    table.writerow(TREND_COLUMNS)
+    for _, quantity, found, _ in report.trends:
+        factor, unit = factor_of(quantity), unit_of(quantity)
+        columns = [found.least, found.mean, found.greatest, found.std]
+        rows = np.stack(columns, axis=1) * factor
+        for start, row, reference in zip(
+            found.start.tolist(), rows.tolist(), found.reference, strict=True
+        ):
+            values = ['' if math.isnan(value) else f'{value:.6g}' for value in row]
+            when = datetime.fromtimestamp(start, UTC).strftime('%Y-%m-%dT%H:%M:%SZ')
+            table.writerow([quantity, unit, when, f'{found.length:g}', *values, cell(reference)])
     return stream.getvalue()
 
 

@@ -175,6 +175,21 @@ def test_refused_and_unlearned_recordings_are_no_clean_bill_of_health(tmp_path, 
     assert 'none: learning' in capsys.readouterr().out
 
 
+def test_fast_samples_in_mode_scada_are_led_to_the_other_mode(tmp_path, capsys):
+    columns = stroke(4000)
+    table = as_csv(columns, tmp_path / 'fast.csv')
+    rate = 1e9 / float(np.diff(columns['stamp']).mean())
+    out = tmp_path / 'fast.json'
+    assert main([str(table), '--mode', 'scada', '--out', str(out)]) == 0
+    said = f'samples at {rate:.0f} Hz, for which there is --mode monitor'
+    assert said in json.loads(out.read_text())[0]['status']
+    printed = capsys.readouterr().out
+    assert said in printed and f'written: {out}' in printed
+    columns['stamp'] = np.arange(4000) * 10**9
+    assert main([str(as_csv(columns, tmp_path / 'slow.csv')), '--mode', 'scada']) == 0
+    assert '--mode monitor' not in capsys.readouterr().out
+
+
 def test_results_that_cannot_be_written_are_refused_before_the_work(tmp_path, capsys):
     table = as_csv(stroke(1000), tmp_path / 'a.csv')
     for option in (['--out', str(table / 'a.json')], ['--figures', str(table)]):

@@ -6,7 +6,7 @@ import json
 import math
 
 import pytest
-from damadics_fd.core.decision import alarm
+from damadics_fd.core.decision import alarm, events, judge
 from damadics_fd.core.decision.alarm import (
     ACKNOWLEDGED,
     SHELVED,
@@ -17,6 +17,7 @@ from damadics_fd.core.decision.alarm import (
     STATE_NOT_MONITORING,
     STATE_SHELVED,
 )
+from damadics_fd.core.decision.events import Decision
 from damadics_fd.core.modes import PHASE_HOLD, PHASE_LEARN_PHI
 
 from .residuals import TICK, Valve
@@ -52,6 +53,24 @@ def test_decision_shorter_than_the_on_delay_is_a_near_miss():  # AM-2
     decision = valve.feed(1.5, 0.6)
     assert decision.fault
     assert decision.since - decision.onset == pytest.approx(0.5e9, abs=2 * TICK)
+
+
+def test_an_alarm_over_no_threshold_names_a_ratio_that_is_one_or_none():
+    assert events.CAPPED == judge.LARGE
+    plain = {name: 0 for name in Decision.names()} | {
+        'stamp': 9, 'occurrence': 1, 'residual': 8.6e-5, 'threshold': 7.6e-8, 'ratio': 1137.27,
+        'peak': judge.LARGE, 'transitions': 1 << alarm.RAISED,
+    }  # fmt: skip
+    (raised,) = Decision(**plain).events
+    assert raised.ratio == 1137.27 and '1137.27 x threshold' in raised.text
+    (raised,) = Decision(**plain | {'threshold': 0.0, 'ratio': judge.LARGE}).events
+    assert (
+        math.isnan(raised.ratio) and 'residual beyond threshold (8.6e-05 / 0 1/s)' in raised.text
+    )
+    (cleared,) = Decision(**plain | {'ratio': 0.2, 'transitions': 1 << alarm.CLEARED}).events
+    assert math.isnan(cleared.ratio) and '00000' not in cleared.text
+    (usual,) = Decision(**plain | {'ratio': 0.2, 'peak': 0.7}).events
+    assert usual.ratio == 0.7
 
 
 def test_chattering_condition_is_one_alarm():  # AM-1

@@ -3,9 +3,11 @@
 """An error in a callback ends neither the node nor its process, and is told."""
 
 import time
+from types import SimpleNamespace
 
 import pytest
 import rclpy
+from damadics_fd.nodes import input_watch
 from damadics_fd.ros.diagnostics import Diagnostics, Level
 from damadics_fd.ros.entities import Entities
 from damadics_fd.ros.process import own_services, status_board
@@ -172,3 +174,17 @@ def test_a_transition_that_does_not_fit_is_answered_and_changes_nothing(node, nu
     future = client.call_async(ChangeState.Request(transition=Transition(id=1)))
     assert node.wait(future.done)
     assert future.result().success, 'the life cycle is out of step'
+
+
+def test_an_input_that_is_silent_is_asked_for_once_not_at_every_look(node, monkeypatch):
+    monkeypatch.setattr(input_watch, 'FIRST_WORD', 0.05)
+    said, turns = [], []
+    log = SimpleNamespace(warning=said.append)
+    monkeypatch.setattr(node, 'get_logger', lambda: log)
+    entities = Entities(node)
+    watch = input_watch.InputWatch(node, entities, 'measurement', 'start the driver', 1.0)
+    entities.timer(0.05, lambda: turns.append(1))  # as often as it would be asked for
+    assert watch.silent
+    assert node.wait(lambda: said and len(turns) >= 10)
+    assert said == ['waiting for /measurement: start the driver']
+    entities.release()

@@ -26,6 +26,7 @@ from damadics_fd.commands.many_valves import (
     warn,
 )
 from damadics_fd.commands.options import add_settings, add_sources, settings_in
+from damadics_fd.commands.stages import Stages
 from damadics_fd.core.settings import Settings, SettingsError
 from damadics_fd.core.settings.identified import REFUSED, FaultFree, Identified
 from damadics_fd.ros.arguments import command_parser
@@ -148,7 +149,20 @@ def main(args: list[str] | None = None) -> int:
     :return: exit code.
     """
     options = arguments(args)
+    with Stages('commission') as stages:
+        return _run(options, stages)
+
+
+def _run(options: argparse.Namespace, stages: Stages) -> int:
+    """Do what the command line says; return the exit code."""
+
+    def told(text: str) -> None:
+        stages.hide()
+        warn(text)
+        stages.tell('reading the recordings')
+
     try:
+        stages.tell('looking at the recordings')
         sheet, given = data_sheet(options.set, options.mode)
         found = find_recordings(
             options.recordings, topic=options.topic, maps=parse_maps(options.map)
@@ -162,17 +176,23 @@ def main(args: list[str] | None = None) -> int:
                 name: str, tag: str, recordings: list[FaultFree], file: Path
             ) -> Identified:
                 reference = options.reference / file.stem if options.reference else None
-                return _commission(recordings, sheet, given, options, source, tag, file, reference)
+                stages.tell(f'{name}: identifying the valve')
+                return _commission(
+                    recordings, sheet, given, options, source, tag, file, reference, stages
+                )
 
-            return _code(commission_all(groups, options, one_of_many, warn))
+            stages.tell(f'reading the recordings of {len(groups)} valves')
+            return _code(commission_all(groups, options, one_of_many, told))
         if options.reference and not options.actuator:
             raise CommissioningError('--reference belongs to an actuator: name it with --actuator')
-        (recordings,) = read_all(groups, warn).values()
+        stages.tell('reading the recordings')
+        (recordings,) = read_all(groups, told).values()
         if not recordings:
             raise CommissioningError(f'{source} holds no measurement')
+        stages.tell('identifying the valve')
         identified = _commission(
             recordings, sheet, given, options, source, options.actuator, options.out,
-            options.reference,
+            options.reference, stages,
         )  # fmt: skip
         for line in identified.report:
             print(line)
@@ -181,6 +201,7 @@ def main(args: list[str] | None = None) -> int:
         if options.twin:
             print(f'twin: {options.twin}')
     except (BagError, CommissioningError, SettingsError, KeyError, OSError, ValueError) as error:
+        stages.hide()
         print(f'commission: {error}', file=sys.stderr)
         return FAILED
     return _code([identified.verdict])
@@ -202,10 +223,14 @@ def _commission(
     tag: str,
     out: Path | None,
     reference: Path | None,
+    stages: Stages,
 ) -> Identified:
     """Identify one valve, and write its files."""
     recordings = until(recordings, options.until)
-    identified = _identify(recordings, sheet, given, options, tag)
+    try:
+        identified = _identify(recordings, sheet, given, options, tag)
+    finally:
+        stages.hide()
     if out:
         text = parameter_file(identified, options.mode, source, tag, str(reference or ''))
         out.write_text(text, encoding='utf-8')

@@ -25,6 +25,7 @@ from damadics_fd.core.signature.state import CAUSES, known
 
 STUCK = 5.0  # s without motion that are worth a word in the text of an alarm
 STATISTIC = 1.0  # threshold where the residual is a statistic over its limit: mode scada
+CAPPED = 1e9  # what the hot loop has for a ratio to a threshold of zero
 ADVICE = {
     NORMAL: '',
     MAINTENANCE_REQUIRED: 'acknowledge; plan an inspection of packing, spring and sensors',
@@ -121,7 +122,7 @@ def _event(transition: int, d: Decision) -> Event:
         int(d.onset),
         float(d.residual),
         float(d.threshold),
-        float(d.peak),
+        _largest(d),
         duration,
         CAUSES[int(d.cause)] if d.cause else '',
         confidence,
@@ -132,6 +133,14 @@ def _event(transition: int, d: Decision) -> Event:
     )
 
 
+def _largest(d: Decision) -> float:
+    """Return the largest ratio; NaN where there was no threshold to compare with."""
+    for ratio in (float(d.peak), float(d.ratio)):
+        if ratio < CAPPED and (ratio >= 1.0 or ratio == d.peak):
+            return ratio
+    return math.nan
+
+
 def _text(transition: int, d: Decision, duration: float) -> str:
     name = TRANSITIONS[transition].replace('_', ' ')
     unnumbered = transition in (SHELVED, UNSHELVED, NEAR_MISS) or not d.occurrence
@@ -139,14 +148,16 @@ def _text(transition: int, d: Decision, duration: float) -> str:
     if d.threshold == STATISTIC:
         text = f'{name}{number}: control-room test at {float(d.ratio):.2f} x its limit'
     else:
+        times = f'{float(d.ratio):.2f} x' if d.ratio < CAPPED else 'beyond'
         text = (
-            f'{name}{number}: velocity residual {float(d.ratio):.2f} x threshold '
+            f'{name}{number}: velocity residual {times} threshold '
             f'({float(d.residual):.3g} / {float(d.threshold):.3g} 1/s)'
         )
     if transition in (RAISED, CHANGED):
         text += f' for {duration:.3g} s, {NE107[int(d.level)]}'
     elif transition == CLEARED:
-        text += f', at most {float(d.peak):.2f} x in {duration:.3g} s'
+        most = f'at most {float(d.peak):.2f} x in' if d.peak < CAPPED else 'after'
+        text += f', {most} {duration:.3g} s'
     if transition in (RAISED, CHANGED) and d.still > STUCK:
         text += f'; position frozen for {float(d.still):.0f} s: stem or position sensor'
     return text
