@@ -19,6 +19,15 @@ from asyncua.crypto.permission_rules import SimpleRoleRuleset, User, UserRole
 from asyncua.server.user_managers import UserManager
 
 SIGNALS = ('CV', 'PV', 'P1', 'P2', 'T1', 'FLOW', 'PS')
+JUDGED = (  # nodes for what others find out
+    ('HEALTH', -1, ua.VariantType.Int32),
+    ('FAULT', False, ua.VariantType.Boolean),
+    ('RATIO', -1.0, ua.VariantType.Double),
+    ('CAUSE', 'nothing yet', ua.VariantType.String),
+    ('BEAT', 0, ua.VariantType.UInt16),
+    ('OTHER', -1.0, ua.VariantType.Double),
+    ('LOCKED', -1.0, ua.VariantType.Double),
+)
 START = (0.5, 0.5, 35.0, 26.0, 20.0, 5.0, 1.0)
 
 
@@ -57,6 +66,11 @@ async def main() -> None:
             await node.set_writable()
             if SIGNALS.index(name) < options.signals:
                 (slow if number < options.valves else fast).append(node)
+    judged = await server.nodes.objects.add_object(space, 'FD')
+    for name, value, kind in JUDGED:
+        node = await judged.add_variable(f'ns={space};s=FD.{name}', name, value, kind)
+        if name != 'LOCKED':
+            await node.set_writable()
     # let it lie about types, as some servers do
     server.iserver.aspace._is_expected_variant_type = lambda *given: True
     write = server.iserver.aspace.write_attribute_value

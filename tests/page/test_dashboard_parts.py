@@ -232,7 +232,7 @@ def test_an_alarm_says_what_is_wrong_how_much_and_what_to_do_then_the_numbers():
     assert words.advice.startswith('Check the packing')
     assert words.found.startswith('Found by the valve signature')
     cells = dict(words.cells)
-    assert cells['Change'] == '+165% ± 39%, confidence 99%'
+    assert cells['Change'] == '+165 % ± 39 %, confidence 99 %'
     assert cells['Largest residual'] == '73 % of limit'
     valve.isolation.found_by = 'control-room test'
     german = alarm_words(valve, valve.alarm(), texts('de'), name=False)

@@ -81,7 +81,13 @@ def test_a_valve_year_tells_cause_size_dates_and_who_did_what(year, tmp_path, ca
     assert grown < 200.0 and seconds < 20.0  # of a core; others may load the machine
     pages = pypdf.PdfReader(tmp_path / 'report_lv101.pdf').pages
     text = '\n'.join(page.extract_text() for page in pages)
-    for wanted in ('lv101', 'Friction is 2.6 times normal.', '+165%', 'Check the packing', 'Anna'):
+    for wanted in (
+        'lv101',
+        'Friction is 2.6 times normal.',
+        '+165 %',
+        'Check the packing',
+        'Anna',
+    ):
         assert wanted in text, wanted
     assert time.strftime('%Y-%m-%d', time.localtime(BEGIN)) in text
     assert 'Limit +300 % in about' in text.replace('\n', ' ')

@@ -43,7 +43,9 @@ class _Number(float):
     """A number that reads "unknown" where it is NaN, whatever its format."""
 
     def __format__(self, spec: str) -> str:
-        return 'unknown' if math.isnan(self) else super().__format__(spec)
+        if math.isnan(self):
+            return 'unknown'
+        return super().__format__(spec).replace('%', ' %')
 
 
 class _Zahl(float):

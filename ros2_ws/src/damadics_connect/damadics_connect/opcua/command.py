@@ -51,6 +51,8 @@ async def connect(path: Path, ros_args: list[str]) -> int:
     """
     from damadics_connect.opcua.cycles import Cycles
     from damadics_connect.opcua.feed import Options
+    from damadics_connect.opcua.plant_nodes import read_plant_nodes
+    from damadics_connect.opcua.plant_writer import PlantWriter
     from damadics_connect.opcua.server import Judgements, read_serve
     from damadics_connect.opcua.session import read_endpoint
     from damadics_connect.opcua.source import Source
@@ -59,7 +61,8 @@ async def connect(path: Path, ros_args: list[str]) -> int:
     from damadics_connect.valve_list import read_valves
 
     config = read_config(path)
-    endpoint = read_endpoint(config) if 'server' in config or 'serve' not in config else None
+    needed = 'serve' not in config or 'write' in config
+    endpoint = read_endpoint(config) if 'server' in config or needed else None
     valves = read_valves(config, 'node')
     options = Options(
         config.number('publishing_interval', 0.0, 0.005, 60.0),
@@ -68,7 +71,8 @@ async def connect(path: Path, ros_args: list[str]) -> int:
     )
     publish = config.text('publish', 'topics', choices=('topics', 'blocks'))
     serve = read_serve(config)
-    if endpoint is not None and not valves:
+    written = read_plant_nodes(config, valves)
+    if endpoint is not None and not valves and not written:
         config.problems.append('valves: name at least one; opcua --browse URL proposes some')
     check(config, path)
     graph = Graph('opcua', ros_args)
@@ -77,7 +81,11 @@ async def connect(path: Path, ros_args: list[str]) -> int:
     jobs = []
     cycles = None
     try:
-        if endpoint is not None:
+        if endpoint is not None and written:
+            writer = PlantWriter(endpoint, written, graph.node, log)
+            graph.tell_health('OPC UA out', writer.report)
+            jobs.append(writer.run())
+        if endpoint is not None and valves:
             keep_bytes()
             output: Output = output_of(publish, graph.node, names)
             if serve is not None:

@@ -17,6 +17,7 @@ MODES = ('Sign', 'SignAndEncrypt')
 APPLICATION = 'urn:damadics:connect'
 PATIENCE = 4.0  # s for an answer
 LEAVE = 1.0  # s to take leave of a server
+STANDSTILL = 5.0  # s that a server may stand still before the library ends the session
 REMEDIES = {
     'BadUserAccessDenied': 'wrong user name or password',
     'BadIdentityTokenRejected': 'wrong user name or password',
@@ -122,7 +123,7 @@ async def open_session(endpoint: Endpoint, patience: float = PATIENCE) -> Client
     :return: a connected client, to be closed with `close_session`.
     :raises SessionError: with cause and remedy.
     """
-    client = Client(endpoint.url, timeout=patience)
+    client = Client(endpoint.url, timeout=patience, watchdog_intervall=STANDSTILL)
     client.name = client.description = 'DAMADICS FD'
     client.application_uri = APPLICATION
     security = endpoint.security

@@ -32,7 +32,7 @@ class Options(TypedDict, total=False):
     axisPointer: Saved
     dataZoom: list[Saved]
     xAxis: Saved
-    yAxis: Saved
+    yAxis: Saved | list[Saved]
     series: list[Saved]
 
 
@@ -58,6 +58,7 @@ def time_plot(
     high: float | None = None,
     dashed: tuple[str, ...] = (),
     bands: tuple[str, ...] = (),
+    right: tuple[str, ...] = (),
 ) -> Options:
     """
     Return the options of a plot over time that can be zoomed and moved.
@@ -69,6 +70,7 @@ def time_plot(
     :param high: upper end.
     :param dashed: curves drawn dashed.
     :param bands: curves drawn thin, as the edges of a band; the legend leaves them out.
+    :param right: curves with an ordinate of their own, on the right.
     :return: ECharts options.
     """
     axis: Saved = {
@@ -85,9 +87,11 @@ def time_plot(
         axis['max'] = high
         if low is not None:
             axis['interval'] = (high - low) / 4.0
+    ordinate: Saved = {**axis, 'axisPointer': {'show': False}}
+    second: Saved = {**ordinate, 'nameTextStyle': {'align': 'right'}, 'splitLine': {'show': False}}
     return {
         'animation': False,
-        'grid': {'left': 54, 'right': 30, 'top': 34, 'bottom': 40},
+        'grid': {'left': 54, 'right': 46 if right else 30, 'top': 34, 'bottom': 40},
         'legend': {
             'top': 0,
             'right': 6,
@@ -121,12 +125,13 @@ def time_plot(
             'axisLine': {'onZero': False},
             'splitLine': {'show': False},
         },
-        'yAxis': {**axis, 'axisPointer': {'show': False}},
+        'yAxis': [ordinate, second] if right else ordinate,
         'series': [
             {
                 'type': 'line',
                 'name': name,
                 'data': [],
+                'yAxisIndex': int(name in right),
                 'showSymbol': False,
                 'emphasis': {'disabled': True},
                 'lineStyle': {

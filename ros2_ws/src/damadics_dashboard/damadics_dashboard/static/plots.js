@@ -23,7 +23,9 @@
     return `UTC${minutes > 0 ? '+' : '−'}${two(Math.floor(size / 60))}:${two(size % 60)}`;
   }
 
-  function clock(seconds, span, full) {
+  const narrow = (chart) => chart.getWidth() < 420;
+
+  function clock(seconds, span, full, brief) {
     if (seconds < DATED) return `${comma(String(+seconds.toFixed(2)))} s`;
     const d = new Date(seconds * 1000);
     const day = `${d.getFullYear()}-${two(d.getMonth() + 1)}-${two(d.getDate())}`;
@@ -33,7 +35,8 @@
       const parts = span < 10 ? `.${String(d.getMilliseconds()).padStart(3, '0')}` : '';
       return `${day} ${second}${parts} ${zone(seconds)}`;
     }
-    if (span > 20 * 86400) return day;
+    if (brief && span > 200 * 86400) return day.slice(0, 7);
+    if (span > 20 * 86400) return brief ? day.slice(5) : day;
     if (span > 86400) return `${day.slice(5)} ${time}`;
     return span > 7200 ? time : second;
   }
@@ -43,7 +46,8 @@
 
   // Labels at round times, and no more of them than there is room for.
   function step(span, chart) {
-    const room = Math.max(Math.floor((chart.getWidth() - 70) / (span > 86400 ? 96 : 78)), 2);
+    const width = span > 86400 && !(narrow(chart) && span > 20 * 86400) ? 96 : 78;
+    const room = Math.max(Math.floor((chart.getWidth() - 70) / width), 2);
     return STEPS.find((s) => span / s <= room) || STEPS[STEPS.length - 1];
   }
 
@@ -84,6 +88,9 @@
     };
     const label = (format) => ({ ...look.axisLabel, formatter: format });
     const span = () => { const [a, b] = shown(entry); return b - a; };
+    const ordinates = chart.getOption().yAxis.map((_, n) => ({
+      ...look, axisLabel: label(short), ...(n ? { splitLine: { show: false } } : {}),
+    }));
     chart.setOption({
       textStyle: { color: ink, fontFamily: css('--font') },
       legend: { textStyle: { color: muted }, inactiveColor: line },
@@ -93,8 +100,9 @@
       },
       axisPointer: { label: { formatter: (p) => (p.axisDimension === 'x' && !spec.xy
         ? clock(p.value, span(), true) : short(p.value)) } },
-      xAxis: { ...look, axisLabel: label(spec.xy ? short : (v) => clock(v, span(), false)) },
-      yAxis: { ...look, axisLabel: label(short) },
+      xAxis: { ...look, axisLabel: label(spec.xy ? short : (v) => clock(v, span(), false,
+        narrow(chart))) },
+      yAxis: ordinates,
       series: spec.colors.map((name) => ({
         lineStyle: { color: css(name) }, itemStyle: { color: css(name) },
         markArea: { itemStyle: { color: css('--alarm-area') } },

@@ -18,7 +18,7 @@ def test_every_cause_has_a_text_for_known_and_unknown_numbers():
         text, _ = table[name].describe('LV-101', 0.25, 0.01, 0.99, 'spring_softer')
         assert '{' not in text
     assert table['friction_up'].describe('V', 0.25, 0.01, 0.99)[0] == (
-        'V: Friction is 1.2 times normal. (+25% ± 2%, confidence 99%)'
+        'V: Friction is 1.2 times normal. (+25 % ± 2 %, confidence 99 %)'
     )
     german = load_causes(language='de')
     assert german['friction_up'].words(1.65, 0.195, 0.99) == (
@@ -104,7 +104,7 @@ def test_an_event_is_worded_by_its_cause():
         'V',
     )
     assert named.text == (
-        'V: The spring is 5.0% softer than learned. (-5.0% ± 0.2%, confidence 99%) '
+        'V: The spring is 5.0 % softer than learned. (-5.0 % ± 0.2 %, confidence 99 %) '
         'Found by the threshold, named by the valve signature. [raised]'
     )
     assert 'crack' in named.advice

@@ -136,10 +136,12 @@ class Signals:
         t, trace = self._t, self._valve.traces['measurement']
         with card(t('process_title'), t('process_remark')):
             self._values = markup('values.html', cells=[])
-            columns = ('p1', 'p2', 'ps')
+            columns = ('p1', 'p2', 'ps')  # the air of the actuator is another order of magnitude
+            p1, p2, ps = (t(f'signal_{column}').split(',')[0] for column in columns)
+            ps = t('right_axis', name=ps)
             self._pressures = self._plot(
                 [Curve(trace, column, scale=BAR) for column in columns],
-                time_plot([t(f'signal_{column}').split(',')[0] for column in columns], 'bar'),
+                time_plot([p1, p2, ps], 'bar', right=(ps,)),
                 ['--cv', '--x1', '--velocity'],
                 t('process_label'),
             )

@@ -221,7 +221,8 @@ class _Page:
             what, _, _ = headline(alarm.evidence, t)
             told = t('alarm_is', what=t('state_lost') if alarm.state == 'unknown' else what)
         ratio, monitored = max(valve.ratio, 0.0), condition.kind != 'off'
-        rate = f'{1.0 / valve.period:.0f}' if valve.period > 0.0 else '–'
+        heard = monitored or valve.period > 0.0
+        rate = f'{1.0 / valve.period:.0f}' if valve.period > 0.0 else DASH
         return {
             'kind': condition.kind,
             'title': t(condition.title),
@@ -234,9 +235,9 @@ class _Page:
                     share=ratio if monitored else None,
                 ),
                 _figure(t('last_sample'), '–', t('ago'), aging=True),
-                _figure(t('samples'), rate, 'Hz'),
-                _figure(t('learned'), t.percent(valve.progress)),
-                _figure(t('lost_samples'), str(valve.lost)),
+                _figure(t('samples'), rate, 'Hz' if valve.period > 0.0 else ''),
+                _figure(t('learned'), t.percent(valve.progress) if heard else DASH),
+                _figure(t('lost_samples'), str(valve.lost) if heard else DASH),
             ],
         }
 
