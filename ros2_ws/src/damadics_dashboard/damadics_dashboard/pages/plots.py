@@ -80,6 +80,7 @@ def time_plot(
         'nameGap': 10,
         'scale': True,
         'splitNumber': 4,
+        'axisPointer': {'show': False},
     }
     if low is not None:
         axis['min'] = low
@@ -87,8 +88,7 @@ def time_plot(
         axis['max'] = high
         if low is not None:
             axis['interval'] = (high - low) / 4.0
-    ordinate: Saved = {**axis, 'axisPointer': {'show': False}}
-    second: Saved = {**ordinate, 'nameTextStyle': {'align': 'right'}, 'splitLine': {'show': False}}
+    second: Saved = {**axis, 'nameTextStyle': {'align': 'right'}, 'splitLine': {'show': False}}
     return {
         'animation': False,
         'grid': {'left': 54, 'right': 46 if right else 30, 'top': 34, 'bottom': 40},
@@ -125,7 +125,7 @@ def time_plot(
             'axisLine': {'onZero': False},
             'splitLine': {'show': False},
         },
-        'yAxis': [ordinate, second] if right else ordinate,
+        'yAxis': [axis, second] if right else axis,
         'series': [
             {
                 'type': 'line',
@@ -296,7 +296,6 @@ class Feed:
             if c.trace.newest >= 0
         )
         begin = max(end - int(self.window * NANO), first)
-        last = begin + int(self.window * NANO)
         message: dict[int, News] = {}
         for plot, curves in self.curves.items():
             everything = any(c.sent < begin for c in curves)
@@ -316,7 +315,7 @@ class Feed:
                 'all': everything,
                 'from': starts,
                 'series': series,
-                'range': [begin * 1e-9, last * 1e-9],
+                'range': [begin * 1e-9, begin * 1e-9 + self.window],
             }
         return message
 
