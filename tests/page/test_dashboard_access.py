@@ -143,6 +143,27 @@ def test_the_token_moves_from_the_address_into_a_cookie_and_nowhere_else():
     assert ask(OPERATOR, query='token=wrong') == 403
 
 
+def test_a_person_without_a_token_is_asked_for_it_a_program_is_refused_in_words():
+    def answer(query: str = '', **headers: str) -> tuple[int, str, str]:
+        first, last = send(Guard(welcome, OPERATOR), '/valve/lv101', query, **headers)
+        return (
+            first['status'],
+            dict(first['headers'])[b'content-type'].decode(),
+            last['body'].decode(),
+        )
+
+    status, kind, page = answer(accept='text/html,*/*')
+    assert (status, kind) == (403, 'text/html; charset=utf-8')
+    assert 'method="get"' in page and 'name="token"' in page, 'asked as ?token=, which is known'
+    assert 'not known' not in page and 'action=' not in page, 'it leads back to the same address'
+    assert 'not known' in answer('token=wrong', accept='text/html')[2]
+    assert 'secret77' not in answer('token=secret77', accept='text/html')[2]
+    assert 'nicht bekannt' in answer('token=x', accept='text/html', accept_language='de')[2]
+    assert answer(accept='*/*')[1].startswith('text/plain')
+    foreign = answer(accept='text/html', origin='http://evil.example')
+    assert foreign[0] == 403 and '<form' not in foreign[2]
+
+
 def test_a_viewer_is_let_in_as_one(monkeypatch):
     seen = []
 

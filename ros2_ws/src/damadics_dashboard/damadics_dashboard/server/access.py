@@ -10,6 +10,9 @@ from urllib.parse import parse_qsl, quote, urlencode, urlsplit
 from damadics_fd.store.access import Access, AccessError, Grant, Role
 from damadics_fd.web.asgi import Application, Message, Receive, Scope, Send
 
+from damadics_dashboard.words.templates import render
+from damadics_dashboard.words.texts import preferred, texts
+
 COOKIE = 'damadics_token'
 LOOPBACK_NAMES = ('localhost', 'localhost.localdomain')
 GRANT = 'damadics.grant'  # in the scope of a request: what its token allows
@@ -92,6 +95,9 @@ class Guard:
         grant = self._grant(dict(asked).get('token', ''), headers)
         if not refusal and grant is None:
             refusal = 'the token is missing: open the address with ?token=... once'
+            if scope['type'] == 'http' and 'text/html' in headers.get('accept', ''):
+                await _ask(send, headers.get('accept-language', ''), 'token' in dict(asked))
+                return
         if refusal or grant is None:
             await _refuse(scope, send, refusal)
         elif scope['type'] == 'http' and not self._access.open and 'token' in dict(asked):
@@ -154,17 +160,22 @@ def _with_headers(send: Send) -> Send:
 
 
 async def _answer(
-    send: Send, status: int, text: str, headers: tuple[tuple[bytes, bytes], ...] = ()
+    send: Send,
+    status: int,
+    text: str,
+    headers: tuple[tuple[bytes, bytes], ...] = (),
+    kind: bytes = b'text/plain; charset=utf-8',
 ) -> None:
-    kind = (b'content-type', b'text/plain; charset=utf-8')
-    await send(
-        {
-            'type': 'http.response.start',
-            'status': status,
-            'headers': [kind, *headers, *HEADERS],
-        }
-    )
+    own = [(b'content-type', kind), *headers, *HEADERS]
+    await send({'type': 'http.response.start', 'status': status, 'headers': own})
     await send({'type': 'http.response.body', 'body': text.encode()})
+
+
+async def _ask(send: Send, languages: str, wrong: bool) -> None:
+    """Ask a person for a token."""
+    t = texts(preferred(languages))
+    page = render('token.html', t=t, language=t.language, wrong=wrong)
+    await _answer(send, 403, page, kind=b'text/html; charset=utf-8')
 
 
 async def _refuse(scope: Scope, send: Send, text: str) -> None:
