@@ -156,6 +156,22 @@ def test_a_lost_server_is_silence_at_once_and_comes_back_without_a_person(connec
     assert 'lv0' in c.values()['Last gap']
 
 
+def test_a_connector_that_was_killed_doubles_nothing_when_it_is_started_again(
+    connect, serve, processes, tmp_path
+):
+    server = serve(1, '--rate', '5')
+    c = connect({'server': url(server), 'period': 0.2, 'valves': {'lv0': valve(0)}})
+    samples = c.samples['lv0']
+    assert c.wait(lambda: len(samples) > 10), c.log()
+    processes.kill('opcua')
+    killed = time.time()
+    c.wait(lambda: False, 1.0)
+    assert stamps(samples)[-1] * 1e-9 < killed + 0.1, 'nobody makes samples up for it'
+    processes.start('damadics_connect', 'opcua', [str(tmp_path / 'plant.yaml')])
+    assert c.wait(lambda: stamps(samples)[-1] * 1e-9 > killed + 2.0), c.log()
+    assert (np.diff(stamps(samples)) > 0).all(), 'no sample is doubled'
+
+
 def test_a_server_that_is_read_gives_the_same_samples(connect, serve):
     server = serve(1)
     c = connect({'server': url(server), 'poll': True, 'period': 0.2, 'valves': {'lv0': valve(0)}})
