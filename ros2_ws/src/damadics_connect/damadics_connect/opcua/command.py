@@ -51,12 +51,12 @@ async def connect(path: Path, ros_args: list[str]) -> int:
     """
     from damadics_connect.opcua.cycles import Cycles
     from damadics_connect.opcua.feed import Options
-    from damadics_connect.opcua.plant_nodes import read_plant_nodes
-    from damadics_connect.opcua.plant_writer import PlantWriter
     from damadics_connect.opcua.server import Judgements, read_serve
     from damadics_connect.opcua.session import read_endpoint
     from damadics_connect.opcua.source import Source
     from damadics_connect.opcua.wire import keep_bytes
+    from damadics_connect.opcua.written.nodes import read_plant_nodes
+    from damadics_connect.opcua.written.writer import PlantWriter
     from damadics_connect.publishing import Output, output_of
     from damadics_connect.valve_list import read_valves
 

@@ -16,7 +16,6 @@ from rclpy.node import Node as RosNode
 from damadics_connect.health import some
 from damadics_connect.judgement import Judgement
 from damadics_connect.opcua.node_ids import node_of
-from damadics_connect.opcua.plant_nodes import PlantNode, Value, fitted, wanted_type
 from damadics_connect.opcua.session import (
     Endpoint,
     SessionError,
@@ -24,6 +23,7 @@ from damadics_connect.opcua.session import (
     open_session,
     why,
 )
+from damadics_connect.opcua.written.nodes import PlantNode, Value, fitted, wanted_type
 from damadics_connect.settings import shown
 from damadics_connect.watch import Watch
 
