@@ -15,8 +15,10 @@ from damadics_fd.core.scada.learning import LearningError, learn
 from damadics_fd.core.scada.monitor import ScadaMonitor
 from damadics_fd.core.scada.samples import scada_samples
 from damadics_fd.core.scada.settings import ScadaSettings
-from damadics_fd.core.scada.state import LAW
+from damadics_fd.core.scada.state import LAW, NOMINAL
 from damadics_plant import Fault, load_scenario, simulate
+
+from .driven import SETTINGS, driven
 
 DATA = Path(__file__).resolve().parents[6] / 'shared' / 'data'
 T, CV, X, P1, P2, T1, F = range(7)
@@ -161,6 +163,15 @@ def test_a_valve_that_stands_still_is_not_learned():
     assert 'travelled' in monitor.learning_problem
     with pytest.raises(LearningError, match='travelled'):
         learn(rows, ScadaSettings(learn_s=400.0))
+
+
+@pytest.mark.parametrize(('swing', 'shift', 'kind'), [(0.1, -0.01, LAW), (0.1, 0.0, NOMINAL)])
+def test_a_quiet_stem_off_the_stated_one_is_another_valve(swing, shift, kind):
+    """Of a stem that hardly moves the stated actuator leaves little, whatever the valve is."""
+    rows = driven(480, seed=21, swing=swing)
+    rows[:, X] += shift
+    settings = dataclasses.replace(SETTINGS, learn_s=480.0)
+    assert learn(rows, settings)['stem_kind'][0] == kind
 
 
 def test_nothing_adapts_after_learning(simulink):
