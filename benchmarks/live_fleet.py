@@ -29,6 +29,7 @@ import numpy as np
 from live_samples import KINDS, SECOND, Kind, faulty_of, make, names_of, send, shift
 
 PATIENCE = 400.0  # s
+ENDING = 120.0  # s that the processes may take to end
 AFTER = 5.0  # s for the last words
 HEALTHY = 2  # FaultFlag.STATE_HEALTHY
 
@@ -223,7 +224,10 @@ def run(options: argparse.Namespace, files: Path, folder: Path) -> dict[str, obj
         began = time.monotonic()
         for pid in pids.values():
             os.kill(pid, signal.SIGINT)
-        ear.wait(lambda: all(processes.ended(name) for name in pids), 60.0)
+        ear.wait(
+            lambda: all(map(processes.ended, pids)) or time.monotonic() > began + ENDING,
+            2.0 * ENDING,
+        )
         found['ended_s'] = time.monotonic() - began
     recorded: dict[str, int] = {}
     for file in bag.glob('*.mcap'):
