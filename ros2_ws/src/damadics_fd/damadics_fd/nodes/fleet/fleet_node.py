@@ -43,6 +43,7 @@ EXAMPLES = """examples:
   ros2 run damadics_fd fleet my_fleet.yaml --ros-args -p expose:=0"""
 HEARTBEAT = 1.0  # s of wall time
 GATHER = 0.02  # s in which measurements of single valves are gathered
+LAST = 5.0  # s for references that are not saved yet when the node ends
 BATCH = 64  # of them that do not wait any longer
 MOST_EXPOSED = 50  # valves with topics of their own, unless the user says otherwise
 
@@ -229,8 +230,9 @@ class FleetNode(SpinnableNode):
         return Level.OK, 'all valves monitored', values
 
     def destroy_node(self) -> None:
-        """Judge what was gathered, hand the valves over, and release the node."""
+        """Judge what was gathered, save and hand over the valves, and release the node."""
         self._judge_gathered()
+        self._keeping.again(patience=LAST)
         self._handover.give()
         self._entities.release()
         super().destroy_node()

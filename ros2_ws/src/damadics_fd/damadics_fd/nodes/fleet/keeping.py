@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a fleet keeps over a restart: alarms and references of its valves."""
 
+import time
 from collections.abc import Collection
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import numpy as np
 from rclpy.node import Node
 
 from damadics_fd.core.decision.detector import Detector
-from damadics_fd.core.modes import PHASE_MONITOR
+from damadics_fd.core.modes import PHASE_LEARN_ALPHA, PHASE_LEARN_PHI, PHASE_MONITOR
 from damadics_fd.core.record import Ints
 from damadics_fd.nodes.alarm_memory import AlarmMemory
 from damadics_fd.nodes.fleet.members import Members, first_stamps
@@ -19,6 +20,9 @@ from damadics_fd.store.references import (
     load_reference,
     save_reference,
 )
+
+LEARNING = (PHASE_LEARN_ALPHA, PHASE_LEARN_PHI)
+AT_ONCE = 0.2  # s of saving before the samples have their turn again
 
 
 class Keeping:
@@ -36,7 +40,7 @@ class Keeping:
         self._folder = folder
         self._memories: dict[int, AlarmMemory] = {}
         self._pending: set[int] = set()  # whose alarms of before are not yet compared with a stamp
-        self._phase = np.zeros(len(members), np.int64)
+        self._kept = np.zeros(len(members), np.bool_)  # what was learned stands in a file
         self._unsaved: dict[int, str] = {}  # references that could not be saved
 
     @property
@@ -54,6 +58,7 @@ class Keeping:
         names = set(self._names())
         for number in but:
             self.keep(number)
+            self._kept[number] = True
         for number, member in enumerate(self._members.all):
             if number in but:
                 continue
@@ -85,15 +90,23 @@ class Keeping:
         if self._folder:
             self._memory(number).keep()
 
-    def again(self) -> None:
-        """Try once more what could not be kept; save references of valves that learned."""
+    def again(self, patience: float = AT_ONCE) -> None:
+        """
+        Try once more what could not be kept; save references of valves that learned.
+
+        :param patience: time after which the rest waits for the next call [s].
+        """
+        end = time.monotonic() + patience
         for memory in self._memories.values():
             if memory.problem:
                 memory.keep()
         phase = self._members.column('phase', np.int64, estimate=True)
-        learned = (phase == PHASE_MONITOR) & (self._phase != PHASE_MONITOR) & (self._phase > 0)
-        self._phase = phase
-        for number in {*np.flatnonzero(learned).tolist(), *self._unsaved}:
+        self._kept &= ~np.isin(phase, LEARNING)
+        learned = np.flatnonzero((phase == PHASE_MONITOR) & ~self._kept).tolist()
+        for number in (*learned, *self._unsaved):
+            if time.monotonic() > end:
+                break
+            self._kept[number] = True
             if self._members.all[number].reference:
                 done, text = self.save(number)
                 (self._node.get_logger().info if done else self._node.get_logger().error)(text)
@@ -151,6 +164,7 @@ class Keeping:
             if quiet:
                 self._node.get_logger().warning(text)
             return False, text
+        self._kept[number] = True
         return True, f'{member.namespace}: reference loaded'
 
     def detector(self, number: int) -> Detector:
