@@ -253,3 +253,28 @@ def test_what_ros_itself_refuses_is_one_line_and_no_restart(domain, name, words,
     assert done.returncode == 2, done.stderr
     assert says in done.stderr
     assert 'Traceback' not in done.stderr and len(done.stderr.splitlines()) <= 5
+
+
+def test_the_plant_takes_the_file_of_a_valve_as_it_is(domain, tmp_path):
+    file = tmp_path / 'lv101.yaml'
+    values = ('actuator: LV-101', 'stroke: 0.05', 'sample_rate: 200.0')
+    file.write_text('\n    '.join(['/**:\n  ros__parameters:', *values]) + '\n')
+    settings = ['--ros-args', '--params-file', str(file)]
+    once = ['-p', 'duration:=0.5', '-p', 'real_time_factor:=0.0']
+    done = subprocess.run(
+        [executable('damadics_plant', 'plant'), *settings, *once],
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert done.returncode == 0, done.stderr
+    assert 'sample_rate, stroke: for monitors' in done.stderr
+    assert '-p valve:=FILE' in done.stderr
+    done = subprocess.run(
+        [executable('damadics_plant', 'plant'), *settings, '-p', 'strok:=1.0'],
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert done.returncode == 2
+    assert 'strok: there is no such parameter' in done.stderr

@@ -16,7 +16,7 @@ from typing import Any
 
 from damadics_fd.bag.errors import BagError
 
-from damadics_plant.actuator.twin import read_twin
+from damadics_plant.actuator.twin import origin, read_twin
 from damadics_plant.export import ALL, Job, run_all, run_one
 from damadics_plant.faults.catalogue import CATALOGUE, Fault
 from damadics_plant.scenarios.library import load_scenario, scenario_names
@@ -81,7 +81,7 @@ def parser() -> argparse.ArgumentParser:
         '--rate',
         type=float,
         metavar='HZ',
-        help='samples per second (default: dablib 400, lugre 200)',
+        help='samples per second (default: dablib 400, lugre 200, with --valve that of the file)',
     )
     p.add_argument('--duration', type=float, metavar='S', help='length of the run')
     p.add_argument('--noise', action='store_true', help="add the benchmark's disturbances")
@@ -198,12 +198,15 @@ def main(args: Sequence[str] | None = None) -> int:
         names[names.index(ALL) : names.index(ALL) + 1] = standard
     warnings.showwarning = lambda message, *_: print(f'simulate: {message}', file=sys.stderr)
     try:
-        model = read_twin(arguments.valve) if arguments.valve else arguments.model
+        model, rate = arguments.model, arguments.rate
+        if arguments.valve:
+            model = read_twin(arguments.valve)
+            rate = rate or origin(arguments.valve).sample_rate
         jobs = [
             Job(
                 scenario_from(name, arguments),
                 arguments.out,
-                arguments.rate,
+                rate,
                 model,
                 arguments.noise,
                 arguments.seed,

@@ -9,6 +9,7 @@ from collections import deque
 from builtin_interfaces.msg import Time
 from damadics_fd.bag.cdr.layout import stamped_encoder
 from damadics_fd.core.sample import SIGNALS
+from damadics_fd.core.settings import Settings
 from damadics_fd.ros import qos
 from damadics_fd.ros.arguments import check_node_arguments
 from damadics_fd.ros.parameters import Parameters
@@ -19,7 +20,7 @@ from rclpy.clock import Clock, ClockType
 from rosgraph_msgs.msg import Clock as ClockMessage
 
 from damadics_plant import Simulator
-from damadics_plant.actuator.twin import read_twin
+from damadics_plant.actuator.twin import Origin, origin, read_twin
 
 DESCRIPTION = 'Simulate the actuator and publish its signals and its faults at the sample rate.'
 EXAMPLES = """examples:
@@ -37,6 +38,7 @@ MESSAGES = {
     'damadics_msgs/msg/FaultState': ('fault', 'strength'),
     'damadics_msgs/msg/Measurement': SIGNALS,
 }
+SETTINGS = tuple(entry['name'] for entry in Settings.describe())  # of monitors
 PATIENCE = 0.5  # s of wall time behind which the pace is given up
 
 
@@ -50,11 +52,19 @@ class Plant(SpinnableNode):
         parameters = Parameters(self)
         declare = parameters.declare
         scenario = declare('scenario', 'nominal', 'name of a scenario, or path of its YAML file')
+        valve = declare('valve', '', 'file of a valve, written by commission; for model')
+        problem, of = '', Origin('', None)
+        try:
+            of = origin(valve) if valve else of
+        except ValueError as error:
+            problem = f'valve: {error}'
         rate = declare(
-            'rate', 400.0, 'samples per second of scenario time [Hz]', limits=(1.0, 1000.0)
+            'rate',
+            of.sample_rate or 400.0,
+            'samples per second of scenario time [Hz]',
+            limits=(1.0, 1000.0),
         )
         model = declare('model', 'dablib', 'model of the actuator', allowed=MODELS)
-        valve = declare('valve', '', 'file of a valve, written by commission; for model')
         noise = declare('noise', False, 'add the noise of the benchmark')
         seed = declare('seed', 0, 'seed of the noise and of random inputs', limits=(0, 2**31 - 1))
         self._factor = declare(
@@ -69,7 +79,7 @@ class Plant(SpinnableNode):
             'number of subscribers on measurement before the first sample',
             limits=(0, 100),
         )
-        self._frame_id = declare('actuator', 'LC74_20', 'tag of the actuator')
+        self._frame_id = declare('actuator', of.actuator or 'LC74_20', 'tag of the actuator')
         duration = declare(
             'duration',
             0.0,
@@ -77,7 +87,8 @@ class Plant(SpinnableNode):
             limits=(0.0, 1e9),
         )
         publish_clock = declare('publish_clock', False, 'publish /clock from scenario time')
-        parameters.check()
+        others = parameters.pass_over(SETTINGS)
+        parameters.check(*([problem] if problem else []))
         try:
             self._simulator = Simulator(
                 scenario,
@@ -87,8 +98,8 @@ class Plant(SpinnableNode):
                 seed=seed,
                 duration=duration or None,
             )
-        except ValueError as problem:
-            parameters.check(f'{"valve" if valve else "scenario"}: {problem}')
+        except ValueError as error:
+            parameters.check(f'{"valve" if valve else "scenario"}: {error}')
         self._measurement = self.create_publisher(Measurement, 'measurement', qos.SAMPLES)
         self._fault_state = self.create_publisher(FaultState, 'fault_state', qos.SAMPLES)
         self.create_service(InjectFault, 'inject_fault', self._inject)
@@ -111,6 +122,11 @@ class Plant(SpinnableNode):
             f'{scenario}, {f"valve {valve}" if valve else f"model {model}"}, {rate:g} Hz, '
             f'real-time factor {self._factor:g}'
         )
+        if others:
+            self.get_logger().warning(
+                f'{", ".join(others)}: for monitors, not for the plant; it simulates the valve of '
+                'a file with -p valve:=FILE'
+            )
 
     def _tick(self) -> None:
         """Publish what has become due."""

@@ -107,6 +107,17 @@ class Parameters:
             name = self._node.get_name()
             raise UsageError('\n  '.join([f'{name} does not start, its parameters:', *problems]))
 
+    def pass_over(self, names: Iterable[str]) -> list[str]:
+        """
+        Let parameters that other nodes read stand in a file for all nodes.
+
+        :param names: of parameters.
+        :return: those that are given and that this node has not declared.
+        """
+        given = [name for name in sorted(names) if name in self._given() and name not in self._names]
+        self._names += given
+        return given
+
     def refuse(self, name: str, text: str) -> None:
         """
         Refuse a parameter that is not declared, where it is given.

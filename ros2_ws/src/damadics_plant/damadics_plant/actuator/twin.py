@@ -4,6 +4,7 @@
 
 from dataclasses import fields
 from pathlib import Path
+from typing import NamedTuple
 
 import yaml
 from damadics_fd.core.record import Saved
@@ -13,6 +14,33 @@ from damadics_plant.actuator.parameters import LuGreActuator
 
 ENTRY, OPERATION, SETTINGS = 'twin', 'operation', 'settings'
 OF_FILE = ('actuator', 'sample_rate')  # not of the model
+
+
+class Origin(NamedTuple):
+    """
+    Which valve a twin is of.
+
+    :param actuator: tag; '' where the file has none.
+    :param sample_rate: of its signals [Hz]; None where the file has none that a plant can play.
+    """
+
+    actuator: str
+    sample_rate: float | None
+
+
+def origin(path: Path | str) -> Origin:
+    """
+    Read which valve a twin is of.
+
+    :param path: as for `read_twin`.
+    :raises ValueError: as `parts_of`.
+    """
+    given = parts_of(path)[ENTRY]
+    tag, rate = given.get('actuator'), given.get('sample_rate')
+    name = tag if isinstance(tag, str) else ''
+    if isinstance(rate, (int, float)) and 1.0 <= rate <= 1000.0:
+        return Origin(name, float(rate))
+    return Origin(name, None)
 
 
 def parts_of(path: Path | str) -> dict[str, Saved]:
