@@ -258,23 +258,38 @@ def test_what_ros_itself_refuses_is_one_line_and_no_restart(domain, name, words,
 def test_the_plant_takes_the_file_of_a_valve_as_it_is(domain, tmp_path):
     file = tmp_path / 'lv101.yaml'
     values = ('actuator: LV-101', 'stroke: 0.05', 'sample_rate: 200.0')
-    file.write_text('\n    '.join(['/**:\n  ros__parameters:', *values]) + '\n')
-    settings = ['--ros-args', '--params-file', str(file)]
-    once = ['-p', 'duration:=0.5', '-p', 'real_time_factor:=0.0']
-    done = subprocess.run(
-        [executable('damadics_plant', 'plant'), *settings, *once],
-        capture_output=True,
-        text=True,
-        timeout=60,
-    )
+    settings = '\n    '.join(['/**:\n  ros__parameters:', *values]) + '\n'
+    file.write_text(settings)
+    done = run_plant(file)
     assert done.returncode == 0, done.stderr
     assert 'sample_rate, stroke: for monitors' in done.stderr
-    assert '-p valve:=FILE' in done.stderr
-    done = subprocess.run(
-        [executable('damadics_plant', 'plant'), *settings, '-p', 'strok:=1.0'],
+    assert 'model dablib, 400 Hz' in done.stderr
+
+    constants = ('mass: 6.0', 'stiffness: 9.0e4', 'area: 0.035', 'dead_volume: 6.0e-3')
+    twin = (*values, *constants, 'supply: 6.0e5', 'coulomb: 200.0')
+    file.write_text(
+        settings + '\n      '.join(['/**/plant:\n  ros__parameters:\n    twin:', *twin]) + '\n'
+    )
+    done = run_plant(file)
+    assert done.returncode == 0, done.stderr
+    assert 'valve LV-101, 200 Hz' in done.stderr
+    assert 'for monitors' not in done.stderr
+
+    file.write_text(file.read_text().replace('coulomb', 'coulom'))
+    done = run_plant(file)
+    assert done.returncode == 2
+    assert 'coulom is no constant of the model; coulomb is missing' in done.stderr
+    done = run_plant(file, 'strok:=1.0')
+    assert done.returncode == 2
+    assert 'strok: there is no such parameter' in done.stderr
+
+
+def run_plant(file, *more):
+    words = ['duration:=0.5', 'real_time_factor:=0.0', *more]
+    given = [word for one in words for word in ('-p', one)]
+    return subprocess.run(
+        [executable('damadics_plant', 'plant'), '--ros-args', '--params-file', str(file), *given],
         capture_output=True,
         text=True,
         timeout=60,
     )
-    assert done.returncode == 2
-    assert 'strok: there is no such parameter' in done.stderr

@@ -16,7 +16,7 @@ from typing import Any
 
 from damadics_fd.bag.errors import BagError
 
-from damadics_plant.actuator.twin import origin, read_twin
+from damadics_plant.actuator.twin import ENTRY, origin, parts_of, read_twin
 from damadics_plant.export import ALL, Job, run_all, run_one
 from damadics_plant.faults.catalogue import CATALOGUE, Fault
 from damadics_plant.scenarios.library import load_scenario, scenario_names
@@ -201,7 +201,7 @@ def main(args: Sequence[str] | None = None) -> int:
         model, rate = arguments.model, arguments.rate
         if arguments.valve:
             model = read_twin(arguments.valve)
-            rate = rate or origin(arguments.valve).sample_rate
+            rate = rate or origin(parts_of(arguments.valve)[ENTRY]).sample_rate
         jobs = [
             Job(
                 scenario_from(name, arguments),

@@ -20,7 +20,7 @@ from rclpy.clock import Clock, ClockType
 from rosgraph_msgs.msg import Clock as ClockMessage
 
 from damadics_plant import Simulator
-from damadics_plant.actuator.twin import Origin, origin, read_twin
+from damadics_plant.actuator.twin import ENTRY, OPERATION, origin, parts_of, twin_of
 
 DESCRIPTION = 'Simulate the actuator and publish its signals and its faults at the sample rate.'
 EXAMPLES = """examples:
@@ -53,11 +53,12 @@ class Plant(SpinnableNode):
         declare = parameters.declare
         scenario = declare('scenario', 'nominal', 'name of a scenario, or path of its YAML file')
         valve = declare('valve', '', 'file of a valve, written by commission; for model')
-        problem, of = '', Origin('', None)
+        twin, problems = parameters.take(ENTRY), []
         try:
-            of = origin(valve) if valve else of
+            twin = parts_of(valve)[ENTRY] if valve else twin
         except ValueError as error:
-            problem = f'valve: {error}'
+            problems.append(f'valve: {error}')
+        of = origin(twin)
         rate = declare(
             'rate',
             of.sample_rate or 400.0,
@@ -87,19 +88,20 @@ class Plant(SpinnableNode):
             limits=(0.0, 1e9),
         )
         publish_clock = declare('publish_clock', False, 'publish /clock from scenario time')
+        parameters.take(OPERATION)  # of the same file; the scenario has its own pressures
         others = parameters.pass_over(SETTINGS)
-        parameters.check(*([problem] if problem else []))
+        parameters.check(*problems)
         try:
             self._simulator = Simulator(
                 scenario,
                 rate=rate,
-                model=read_twin(valve) if valve else model,
+                model=twin_of(twin, valve or ENTRY) if twin else model,
                 noise=noise,
                 seed=seed,
                 duration=duration or None,
             )
         except ValueError as error:
-            parameters.check(f'{"valve" if valve else "scenario"}: {error}')
+            parameters.check(f'{"valve" if twin else "scenario"}: {error}')
         self._measurement = self.create_publisher(Measurement, 'measurement', qos.SAMPLES)
         self._fault_state = self.create_publisher(FaultState, 'fault_state', qos.SAMPLES)
         self.create_service(InjectFault, 'inject_fault', self._inject)
@@ -118,11 +120,11 @@ class Plant(SpinnableNode):
         self.create_timer(
             self._tick_length, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME)
         )
+        played = f'valve {valve or of.actuator}' if twin else f'model {model}'
         self.get_logger().info(
-            f'{scenario}, {f"valve {valve}" if valve else f"model {model}"}, {rate:g} Hz, '
-            f'real-time factor {self._factor:g}'
+            f'{scenario}, {played}, {rate:g} Hz, real-time factor {self._factor:g}'
         )
-        if others:
+        if others and not twin:
             self.get_logger().warning(
                 f'{", ".join(others)}: for monitors, not for the plant; it simulates the valve of '
                 'a file with -p valve:=FILE'

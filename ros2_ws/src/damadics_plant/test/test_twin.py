@@ -8,7 +8,7 @@ from damadics_fd.commands.commission.command import main as commission
 from damadics_fd.core.settings.document import COMMISSION, ValveDocument, section
 from damadics_fd.core.settings.identified import VERDICTS
 from damadics_plant import LuGreActuator
-from damadics_plant.actuator.twin import Origin, origin, parts_of, read_twin
+from damadics_plant.actuator.twin import ENTRY, Origin, origin, parts_of, read_twin
 from damadics_plant.command import main
 
 VALUES = {
@@ -39,9 +39,9 @@ def test_a_twin_is_an_actuator_with_its_constants(tmp_path):
 
 def test_a_rate_that_no_plant_can_play_is_not_taken(tmp_path):
     path = written(tmp_path / 'v.yaml')
-    assert origin(path) == Origin('LV-101', 200.0)
+    assert origin(parts_of(path)[ENTRY]) == Origin('LV-101', 200.0)
     path.write_text(path.read_text().replace('200.0', '5000.0', 1))
-    assert origin(path) == Origin('LV-101', None)
+    assert origin(parts_of(path)[ENTRY]) == Origin('LV-101', None)
 
 
 @pytest.mark.parametrize(
@@ -75,7 +75,7 @@ def test_the_file_of_a_valve_runs_as_it_is(tmp_path, capsys):
     assert (document.actuator, document.settings.sample_rate) == ('LV-101', 100.0)
     assert read_twin(valve).stiffness == document.settings.stiffness
     assert parts_of(valve)['settings']['stiffness'] == document.settings.stiffness
-    assert origin(valve) == ('LV-101', 100.0)
+    assert origin(parts_of(valve)[ENTRY]) == ('LV-101', 100.0)
     again = tmp_path / 'again.csv'
     words = ['nominal', '--valve', str(valve), '--duration', '10']
     assert main([*words, '--quiet', '--out', str(again)]) == 0

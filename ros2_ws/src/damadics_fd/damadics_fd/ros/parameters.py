@@ -13,7 +13,7 @@ from rclpy.parameter import Parameter
 
 from damadics_fd.core.field import Given
 from damadics_fd.core.modes import MODES
-from damadics_fd.core.record import Plain
+from damadics_fd.core.record import Plain, Saved
 from damadics_fd.core.settings import Settings, SettingsError, unread
 from damadics_fd.ros.spin import UsageError
 
@@ -114,9 +114,27 @@ class Parameters:
         :param names: of parameters.
         :return: those that are given and that this node has not declared.
         """
-        given = [name for name in sorted(names) if name in self._given() and name not in self._names]
+        given = [
+            name for name in sorted(names) if name in self._given() and name not in self._names
+        ]
         self._names += given
         return given
+
+    def take(self, group: str) -> Saved:
+        """
+        Take the parameters of a group as they are given; who uses them checks them.
+
+        :param group: what stands before the dot of their names.
+        :return: values by name, without the group; lists as text.
+        """
+        values: Saved = {}
+        for name, parameter in self._given().items():
+            if name.startswith(f'{group}.'):
+                self._names.append(name)
+                value = parameter.value
+                single = value if isinstance(value, (int, float, str)) else f'{value}'
+                values[name.removeprefix(f'{group}.')] = single
+        return values
 
     def refuse(self, name: str, text: str) -> None:
         """

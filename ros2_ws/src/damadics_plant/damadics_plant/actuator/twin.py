@@ -28,15 +28,13 @@ class Origin(NamedTuple):
     sample_rate: float | None
 
 
-def origin(path: Path | str) -> Origin:
+def origin(entry: Saved) -> Origin:
     """
-    Read which valve a twin is of.
+    Tell which valve a twin is of.
 
-    :param path: as for `read_twin`.
-    :raises ValueError: as `parts_of`.
+    :param entry: ENTRY of a file.
     """
-    given = parts_of(path)[ENTRY]
-    tag, rate = given.get('actuator'), given.get('sample_rate')
+    tag, rate = entry.get('actuator'), entry.get('sample_rate')
     name = tag if isinstance(tag, str) else ''
     if isinstance(rate, (int, float)) and 1.0 <= rate <= 1000.0:
         return Origin(name, float(rate))
@@ -80,10 +78,21 @@ def read_twin(path: Path | str) -> LuGreActuator:
     :return: the constants of the model.
     :raises ValueError: naming the file and every constant that is missing, unknown or wrong.
     """
-    given = parts_of(path)[ENTRY]
+    return twin_of(parts_of(path)[ENTRY], f'{path}')
+
+
+def twin_of(entry: Saved, where: str) -> LuGreActuator:
+    """
+    Make the actuator of a twin.
+
+    :param entry: ENTRY of a file.
+    :param where: it stands, for messages.
+    :return: the constants of the model.
+    :raises ValueError: naming every constant that is missing, unknown or wrong.
+    """
     known = {field.name for field in fields(LuGreActuator)}
     values, wrong = {}, []
-    for name, value in given.items():
+    for name, value in entry.items():
         if name in OF_FILE:
             continue
         if name not in known:
@@ -99,5 +108,5 @@ def read_twin(path: Path | str) -> LuGreActuator:
         if not values.get(name):
             wrong.append(f'{name} is missing')
     if wrong:
-        raise ValueError(f'{path}: {"; ".join(wrong)}')
+        raise ValueError(f'{where}: {"; ".join(wrong)}')
     return LuGreActuator(**values)
