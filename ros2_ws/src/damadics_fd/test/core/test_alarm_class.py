@@ -73,7 +73,7 @@ def own_alarm(value: float, std: float) -> Valve:
     valve.feed(0.1, 0.1)
     known = valve.detector.signature.state[0]
     known.own, known.cause, known.cause_value, known.cause_std = 1, FRICTION, value, std
-    known.state, known.ne[:] = STATE_ALARM, 0.0
+    known.state, known.ne[:], known.r_ref = STATE_ALARM, 0.0, 1.0
     valve.feed(0.1, 0.1)
     return valve
 
