@@ -163,9 +163,9 @@ def _run(arguments: argparse.Namespace) -> None:
         debounce=arguments.debounce,
         isolated_seeds=arguments.isolated_seeds,
     )
-    campaign = admit(campaign, _tell)
+    campaign, refused = admit(campaign, _tell)
     train(_tell, campaign.detectors)
-    results = run_campaign(campaign, arguments.out, arguments.jobs, arguments.scheduler)
+    results = run_campaign(campaign, arguments.out, arguments.jobs, arguments.scheduler, refused)
     for reason in dict.fromkeys(r['reason'] for r in results if r['kind'] == 'refused'):
         _tell(f'refused: {reason}')
     print(f'{len(results)} results in {arguments.out}')

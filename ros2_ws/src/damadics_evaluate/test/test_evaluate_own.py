@@ -212,7 +212,10 @@ def outside(tmp_path, monkeypatch):
 def refusals(err, *names):
     """Assert that those detectors were refused by name, each in one line."""
     for name in names:
-        assert any('refused' in line and name in line for line in err.splitlines()), (name, err)
+        assert any('refused' in line.lower() and name in line for line in err.splitlines()), (
+            name,
+            err,
+        )
 
 
 def test_run_paper_lublin_and_report_take_what_is_ones_own(
@@ -256,6 +259,9 @@ def test_run_paper_lublin_and_report_take_what_is_ones_own(
     page = (out / 'index.html').read_text()
     assert all(word in page for word in ('SlackSpring', 'OneSidedCusum', 'Sluggish', 'A3 f16'))
     assert 'OneSidedCusum' in (out / 'detection.tex').read_text()
+    for form in (page, (out / 'README.md').read_text()):
+        refusals(form, 'Peak looks ahead', 'Raises raises')
+        assert '2 of your own' in form
 
 
 def sticking_day():

@@ -5,7 +5,7 @@
 import json
 import multiprocessing
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
 from dataclasses import asdict, replace
@@ -59,7 +59,11 @@ def read_results(directory: Path) -> list[Result]:
 
 
 def run_campaign(
-    campaign: Campaign, directory: Path, jobs: int | None = None, scheduler: str | None = None
+    campaign: Campaign,
+    directory: Path,
+    jobs: int | None = None,
+    scheduler: str | None = None,
+    refused: Sequence[str] = (),
 ) -> list[Result]:
     """
     Run what is missing of a campaign and return all its results.
@@ -68,9 +72,10 @@ def run_campaign(
     :param directory: where results go; results already there with the same settings are kept.
     :param jobs: local processes, by default one per core.
     :param scheduler: address of a Dask scheduler, such as tcp://host:8786, instead of processes.
+    :param refused: why detectors were left out; kept for the report.
     """
     directory.mkdir(parents=True, exist_ok=True)
-    _write_manifest(campaign, directory)
+    _write_manifest(campaign, directory, refused)
     earlier = read_results(directory) if (directory / RESULTS).exists() else []
     hashes = {name: campaign.settings_hash(name) for name in campaign.detectors}
     kept = [r for r in earlier if hashes.get(r['detector']) == r['settings_hash']]
@@ -82,30 +87,32 @@ def run_campaign(
     return kept
 
 
-def admit(campaign: Campaign, tell: Callable[[str], None]) -> Campaign:
+def admit(campaign: Campaign, tell: Callable[[str], None]) -> tuple[Campaign, list[str]]:
     """
     Check the detectors that are not built in, and leave out those that must not take part.
 
     :param campaign: as stated.
     :param tell: told of every detector that is refused, and why.
-    :return: the campaign with the others.
+    :return: the campaign with the others, and why each of the rest was refused.
     :raises ValueError: where none is left.
     """
-    kept = []
+    kept: list[str] = []
+    refused: list[str] = []
     for name in campaign.detectors:
         if name not in DETECTORS:
             try:
                 refuse(find_detector(name), learning_hour(0), scenario_run(CHECKED_ON, 0)[0])
             except RefusedError as error:
                 tell(f'refused: {error}')
+                refused.append(str(error))
                 continue
         kept.append(name)
     if not kept:
         raise ValueError('no detector is left: mend them, evaluate check DETECTOR tells how')
-    return replace(campaign, detectors=tuple(kept))
+    return replace(campaign, detectors=tuple(kept)), refused
 
 
-def _write_manifest(campaign: Campaign, directory: Path) -> None:
+def _write_manifest(campaign: Campaign, directory: Path, refused: Sequence[str]) -> None:
     """Write what was run here, all calls together."""
     file = directory / MANIFEST
     stated = asdict(campaign)
@@ -115,7 +122,7 @@ def _write_manifest(campaign: Campaign, directory: Path) -> None:
             stated[name] = list(dict.fromkeys((*earlier[name], *stated[name])))
         for name in ('nominal_days', 'isolated_seeds'):
             stated[name] = max(earlier[name], stated[name])
-    manifest = {'campaign': stated, 'versions': versions()}
+    manifest = {'campaign': stated, 'refused': list(refused), 'versions': versions()}
     file.write_text(json.dumps(manifest, indent=2), encoding='utf-8')
 
 

@@ -39,7 +39,7 @@ def latex_table(content: Result) -> str:
     head = ' & '.join(['scenario', *(rf'\rotatebox{{90}}{{{title}}}' for title in titles)])
     lines = [
         r'% needs \usepackage{booktabs,graphicx}',
-        rf'% seeds {content["seeds"]}, settings {content["settings_hash"]}',
+        rf'% {content["seeds"]}, settings {content["settings_hash"]}',
         r'\begin{tabular}{l' + 'r' * len(titles) + '}',
         r'\toprule',
         head + r' \\',

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from damadics_evaluate.benchmark.results import Result
 from damadics_evaluate.detectors.find import title_of
 from damadics_evaluate.report.cells import cell, share
+from damadics_evaluate.report.headlines import NO_SHORTFALL
 
 
 def _markdown(grid: Sequence[Sequence[str]]) -> list[str]:
@@ -20,16 +21,17 @@ def readme_of(content: Result) -> str:
     lines = [
         '# Results',
         '',
-        f'{content["scenarios"]} scenarios, {len(content["detectors"])} detectors, seeds '
-        f'{content["seeds"]}; settings {content["settings_hash"]}. `make report` builds the page '
-        'with curves, forms and figures, index.html, beside this one; every figure of its tables: '
+        f'{content["scenarios"]}, {len(content["detectors"])} detectors, {content["seeds"]}; '
+        f'settings {content["settings_hash"]}. `evaluate report` builds the page with curves, '
+        'forms and figures, index.html, beside this one; every figure of its tables: '
         '[summary.csv](summary.csv).',
+        *(f'\nRefused: {reason}' for reason in content['refused']),
         '',
         *(f'- **{figure}** {text}' for figure, text in content['cards']),
         '',
         '## What is not detected or not isolated, and why',
         '',
-        *(f'- {line}' for line in content['shortfalls']),
+        *(f'- {line}' for line in content['shortfalls'] or [NO_SHORTFALL]),
         '',
         '## Detection time, median t_dt in s',
         '',

@@ -14,7 +14,7 @@ from damadics_evaluate.benchmark.units import limits
 from damadics_evaluate.detectors.find import title_of
 from damadics_evaluate.report import figures
 from damadics_evaluate.report.cells import cell, share
-from damadics_evaluate.report.headlines import cards, shortfalls
+from damadics_evaluate.report.headlines import NO_SHORTFALL, cards, shortfalls
 from damadics_evaluate.report.latex import latex_table
 from damadics_evaluate.report.readme import readme_of
 from damadics_evaluate.report.tables import (
@@ -48,6 +48,14 @@ def write_report(source: Path, target: Path) -> list[Path]:
         raise ValueError(f'{source} holds no scenario: run evaluate run --out {source}')
     manifest = json.loads((source / MANIFEST).read_text(encoding='utf-8'))
     content = _content(Campaign.of_manifest(manifest['campaign']), results)
+    content['refused'] = list(
+        dict.fromkeys(
+            (
+                *manifest.get('refused', ()),
+                *(r['reason'] for r in results if r['kind'] == 'refused'),
+            )
+        )
+    )
     for key, name in (('paper', PAPER), ('lublin', LUBLIN)):
         file = source / name
         content[key] = json.loads(file.read_text(encoding='utf-8')) if file.exists() else None
@@ -81,20 +89,22 @@ def _content(campaign: Campaign, results: Sequence[Result]) -> Result:
     own = [r for r in rows if r['scenario'] not in SCENARIOS and '@' not in r['scenario']]
     false_alarms = tables.false_alarms(results, limit, first_seed)
     return {
-        'scenarios': len({r['scenario'] for r in standard}),
+        'scenarios': _counted(
+            len({r['scenario'] for r in standard}), len({r['scenario'] for r in own})
+        ),
         'detectors': detectors,
         'titles': {d: title_of(d) for d in detectors},
-        'seeds': f'{min(campaign.seeds)} to {max(campaign.seeds)}',
+        'seeds': _range(campaign.seeds),
         'calibration_days': campaign.calibration_days,
         'nominal_days': max((r['days'] for r in false_alarms), default=0),
         'settings_hash': campaign.settings_hash('scada') if 'scada' in present else '',
         'summary': rows,
         'whole': all(r['detected'] in (0, r['runs']) for r in standard),
         'cards': cards(standard, false_alarms),
+        'no_shortfall': NO_SHORTFALL,
         'shortfalls': shortfalls([*standard, *free]),
         'grid': grid_of([*standard, *own], detectors),
         'free': free,
-        'refused': list(dict.fromkeys(r['reason'] for r in results if r['kind'] == 'refused')),
         'times': TIMES,
         'over_time': isolation_over_time(results),
         'named': named_over_time(results, 'scada'),
@@ -102,10 +112,24 @@ def _content(campaign: Campaign, results: Sequence[Result]) -> Result:
         'false_alarms': false_alarms,
         'forms': forms_of(results),
         'figures': {
-            'bars': figures.delay_bars(standard),
+            'bars': figures.delay_bars([*standard, *own]),
             'delays': figures.delay_curves(results, detectors),
             'operating': figures.operating_curves(results, limit, first_seed),
             'detectability': figures.detectability(results),
             'heat': figures.heat_map(results),
         },
     }
+
+
+def _counted(standard: int, own: int) -> str:
+    parts = []
+    if standard or not own:
+        parts.append(f'{standard} scenario{"s" * (standard != 1)} of the benchmark')
+    if own:
+        parts.append(f'{own} of your own')
+    return ' and '.join(parts)
+
+
+def _range(seeds: Sequence[int]) -> str:
+    first, last = min(seeds), max(seeds)
+    return f'seed {first}' if first == last else f'seeds {first} to {last}'
