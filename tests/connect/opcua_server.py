@@ -45,6 +45,7 @@ async def main() -> None:
     p.add_argument('--rate', type=float, default=0.0, help='of changes of every signal [Hz]')
     p.add_argument('--fast', type=int, default=0, help='further valves that change at 50 Hz')
     p.add_argument('--signals', type=int, default=7, help='of each valve that change')
+    p.add_argument('--behind', type=float, default=0.0, help='share of time it falls behind by')
     p.add_argument('--user', action='store_true')
     p.add_argument('--certificates', type=Path)
     options = p.parse_args()
@@ -94,7 +95,7 @@ async def main() -> None:
                     ),
                 )
             n += 1
-            due += period
+            due += period / (1.0 - options.behind)
             await asyncio.sleep(max(0.0, due - loop.time()))
 
     async def obey() -> None:

@@ -7,10 +7,12 @@ from datetime import UTC, datetime
 
 from damadics_fd.ros.diagnostics import Level, Report
 
-from damadics_connect.joining import NANO, Joiner
+from damadics_connect.joining import Joiner
 from damadics_connect.publishing import Output
+from damadics_connect.source_clock import NANO
 
 NAMED = 5  # valves that a message names
+LATE = 2.5  # s that changes may come late before it is told; three periods of slow valves
 
 
 def moment(stamp: int) -> str:
@@ -50,6 +52,7 @@ def report(
     output: Output,
     values: Mapping[str, object],
     problems: Sequence[str] = (),
+    now: int = 0,
 ) -> Report:
     """
     Sum a source up.
@@ -59,6 +62,7 @@ def report(
     :param output: where the samples go.
     :param values: further key-values.
     :param problems: further things that are not well.
+    :param now: as given to the joiners [ns]; 0: how late changes come is not told.
     :return: level, sentence and key-values for `Diagnostics`.
     """
     tallies = {name: joiner.tally for name, joiner in joiners.items()}
@@ -66,11 +70,15 @@ def report(
     bad = [f'{n} {s}: {why}' for n, tally in tallies.items() for s, why in tally.bad.items()]
     uncertain = [f'{n} {s}' for n, tally in tallies.items() for s in tally.uncertain]
     gaps = [(tally.last_gap, name) for name, tally in tallies.items() if tally.gaps]
+    late = {n: joiner.lateness(now) / NANO for n, joiner in joiners.items()} if now else {}
+    behind = [n for n, by in late.items() if by > max(LATE, 3 * joiners[n].period)]
     told = {
         **values,
         'Samples': output.samples,
         'Samples of held values': sum(tally.held for tally in tallies.values()),
         'Values late': sum(tally.late for tally in tallies.values()),
+        'Changes after a held sample of their time': sum(t.overtaken for t in tallies.values()),
+        'Changes come late by [s]': f'{max(late.values(), default=0.0):.1f}',
         'Values sent twice': sum(tally.repeated for tally in tallies.values()),
         'Stamps in the future': sum(tally.future for tally in tallies.values()),
         'Clock steps of the source': sum(tally.steps for tally in tallies.values()),
@@ -87,6 +95,14 @@ def report(
         return Level.ERROR, fault, told
     words = [
         *problems,
+        *(
+            [
+                f'changes of {some(behind)} come up to {max(map(late.__getitem__, behind)):.0f} s '
+                'late: their source has fallen behind'
+            ]
+            if behind
+            else []
+        ),
         *([f'nothing yet from {some(missing)}'] if missing else []),
         *([f'bad: {some(bad)}'] if bad else []),
         *(

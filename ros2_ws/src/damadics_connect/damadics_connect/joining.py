@@ -15,19 +15,15 @@ from dataclasses import dataclass, field
 
 from damadics_fd.core.sample import SIGNALS
 
-from damadics_connect.lately import Lately
+from damadics_connect.source_clock import DAY, MOST_LATE, NANO, SourceClock
 
-NANO = 1_000_000_000
-DRIFT = 200e-6  # of the source's clock against ours
 STEP = NANO  # ns; stamps further back than this may be a clock set back, others are only late
 LONGEST_FILL = 3 * NANO  # ns, or three periods: a longer pause is a gap, not a hold
-LATE = 10 * NANO  # ns for which it is remembered how late changes have come
-MOST_LATE = 5 * NANO // 2  # ns that held samples wait for late changes
-DAY = 86_400 * NANO
 WAIT = 2 * NANO  # ns for the first values of all signals
 FIRST_HOLD = 3 * NANO // 10  # ns without a change before the first held sample: a source that
 # has been changing and pauses for less is more likely held up than at rest
 NAN = math.nan
+TELLING = 0b11  # CV and X tell how late a source is: t1 or ps may come by a slow way of their own
 Emit = Callable[[int, list[float]], None]
 
 
@@ -38,6 +34,7 @@ class Tally:
     samples: int = 0
     held: int = 0  # samples without a change
     late: int = 0  # values older than what had been taken in
+    overtaken: int = 0  # changes that came when a held sample of their time had been sent
     repeated: int = 0  # values sent twice
     future: int = 0  # stamps more than a day ahead
     steps: int = 0  # of the source's clock
@@ -64,7 +61,7 @@ class Joiner:
         self._settle = settle
         self._first_hold = max(settle, FIRST_HOLD)
         self._holding = False  # the last sample was a held one
-        self._late = Lately(LATE)
+        self._clock = SourceClock()
         self._step = max(STEP, 3 * period)
         self._emit = emit
         self._expected = sum(1 << slot for slot in signals)
@@ -78,16 +75,20 @@ class Joiner:
         self._last = 0  # stamp of the last sample
         self._sent_at = 0
         self._alive_since = 0
-        self._ahead: int | None = None  # source's clock less ours
-        self._ahead_at = 0
         self._resumed = False
         self._first = True  # no sample since the session began
-        self._guessed = False  # no change since the session began has told the source's time
+        self._set_back_there = False  # the server's clock was
+        self._behind = 0  # stamp of a change far behind the last sample
 
     @property
     def last(self) -> int:
         """Stamp of the last sample [ns], 0 before the first."""
         return self._last
+
+    @property
+    def period(self) -> float:
+        """Of the valve's clock [s]."""
+        return self._period / NANO
 
     @property
     def waiting_for(self) -> tuple[str, ...]:
@@ -106,8 +107,8 @@ class Joiner:
         self._alive_since = now
         self._resumed = self._last > 0
         self._first = True
-        self._ahead = None
-        self._ahead_at = now
+        self._set_back_there = False
+        self._clock.begin(now)
 
     def source_clock(self, source_now: int, now: int) -> None:
         """
@@ -116,10 +117,15 @@ class Joiner:
         :param source_now: [ns].
         :param now: [ns].
         """
-        if self._ahead is None:
-            self._ahead = source_now - now
-            self._ahead_at = now
-            self._guessed = True
+        self._clock.guess(source_now, now)
+
+    def server_set_back(self) -> None:
+        """Expect the source's clock to be set back, as that of its server was."""
+        self._set_back_there = True
+
+    def lateness(self, now: int) -> int:
+        """Return how late changes have come of late [ns]."""
+        return self._clock.latest(now)
 
     def without(self, slot: int) -> None:
         """Go on without a signal that the source does not have."""
@@ -146,10 +152,9 @@ class Joiner:
                     return
             elif not self._set_back(slot, stamp, before, now):
                 return
-        ahead = self._ahead
-        if ahead is not None and stamp - now - ahead > DAY:
+        if self._clock.known and stamp - self._clock.at(now) > DAY:
             self.tally.future += 1
-            stamp = now + ahead
+            stamp = self._clock.at(now)
         if self._group and (
             stamp - self._start >= self._period
             or (self._mask & bit and 2 * (stamp - self._start) >= self._period)
@@ -177,9 +182,9 @@ class Joiner:
         known = now if known is None else known
         if self._group and known - self._opened >= self._settle:
             self._close(now)
-        if self._group or not self._complete(now) or self._ahead is None:
+        if self._group or not self._complete(now) or not self._clock.known:
             return
-        due = self._due(known, self._ahead)
+        due = self._due(known)
         if not self._last or due - self._last > max(LONGEST_FILL, 3 * self._period):
             newest = max(self._times)
             if newest > due:
@@ -190,24 +195,21 @@ class Joiner:
             return
         while self._last <= due:
             self._send(self._last + self._period, known, held=True)
-            due = self._due(known, self._ahead)
+            due = self._due(known)
 
-    def _due(self, known: int, ahead: int) -> int:
+    def _due(self, known: int) -> int:
         """Return the stamp after which a held sample is due."""
         wait = self._settle if self._holding or not self._last else self._first_hold
-        late = min(self._late.largest(known), MOST_LATE)
-        return known + ahead - self._period - max(wait, late)
+        late = min(self._clock.latest(known), MOST_LATE)
+        if late > wait:
+            wait = late + self._settle  # the next may come later still
+        return self._clock.at(known) - self._period - wait
 
     def _close(self, now: int) -> None:
         """End the present sample: fill the time before it, apply it, send it."""
         start, end = self._start, self._end
-        ahead = end - now
-        if self._ahead is None:
-            self._ahead = ahead
-        else:
-            drifted = self._ahead - int((now - self._ahead_at) * DRIFT)
-            self._ahead = ahead if ahead > drifted else drifted
-        self._ahead_at = now
+        telling = self._mask & TELLING != 0 or not self._expected & TELLING
+        late = self._clock.hear(end, now, telling=telling)
         complete = self._complete(now)
         if complete and self._last and not self._resumed:
             self._fill(start, now)
@@ -215,18 +217,42 @@ class Joiner:
             self._values[slot] = value
         self._group.clear()
         self._mask = 0
-        if self._first and now + self._ahead - end > self._period + self._settle:
+        if self._first and late > self._period + self._settle:
             return  # a value of long ago, as every session begins with: it is held from now on
-        self._late.take(now + self._ahead - end, now)
-        if complete and end > self._last:
+        if telling:
+            self._clock.late(late, now)
+        if end <= self._last:
+            self._take_overtaken(end, now, complete, telling)
+        elif complete:
             if self._last:
                 self._tell_gap(end)
+            self._set_back_there, self._behind = False, 0
             self._send(end, now, held=False)
-        elif end <= self._last:
-            self._ahead = ahead  # a held sample came too early: the clock was set back a little
-            if complete and self._guessed and self._last - end >= self._step:
-                self.tally.steps += 1  # the source's clock is far behind that of its server
+
+    def _take_overtaken(self, end: int, now: int, complete: bool, telling: bool) -> None:
+        """Tell a clock that was set back from changes that have come too late."""
+        back = self._last - end
+        if back < self._step:
+            self._clock.set(end, now)  # set back a little, or late: which does not matter
+        elif complete and (self._clock.guessed or self._set_back_there):
+            self._go_back(end, now)
+            self._send(end, now, held=False)
+            return
+        elif telling and back > MOST_LATE:
+            if complete and 0 < self._behind <= end:
+                self._go_back(end, now)
                 self._send(end, now, held=False)
+                return
+            self._behind = end
+        self.tally.overtaken += 1
+
+    def _go_back(self, stamp: int, now: int) -> None:
+        """Go on at a stamp of a clock that was set back."""
+        self.tally.steps += 1
+        self._set_back_there, self._behind = False, 0
+        self._clock.set(stamp, now)
+        self._times = [min(each, stamp) for each in self._times]
+        self._back = [0] * len(SIGNALS)
 
     def _complete(self, now: int) -> bool:
         return not self._expected & ~self._known or now - self._alive_since > WAIT
@@ -252,28 +278,23 @@ class Joiner:
     def _set_back(self, slot: int, stamp: int, before: int, now: int) -> bool:
         """Tell a clock that was set back from a value that is late: it goes on from there."""
         back = self._back[slot]
-        if not back or stamp <= back:
+        expected = self._set_back_there and before - stamp >= self._step
+        if not expected and (not back or stamp <= back):
             self._back[slot] = stamp if before - stamp >= self._step else 0
             self._known |= 1 << slot
             self.tally.late += 1
             return False
-        self._close_before_step(now)
-        self.tally.steps += 1
-        self._ahead = stamp - now
-        self._ahead_at = now
-        self._times = [min(each, stamp - 1) for each in self._times]
-        self._back = [0] * len(SIGNALS)
-        self._last = 0
-        return True
-
-    def _close_before_step(self, now: int) -> None:
         if self._group:
             self._close(now)
+        self._go_back(stamp, now)
+        self._times = [min(each, stamp - 1) for each in self._times]
+        self._last = 0
+        return True
 
     def _send(self, stamp: int, now: int, held: bool) -> None:
         self._last = stamp
         self._first = False
-        self._guessed &= held
+        self._clock.guessed &= held
         self._holding = held
         self._sent_at = now
         self.tally.samples += 1

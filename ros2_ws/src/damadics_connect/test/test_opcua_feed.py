@@ -117,6 +117,66 @@ def test_a_valve_at_rest_is_held_again_after_a_stall_without_a_gap():
     assert len(before) > 50 * (puts[-1] - 0.6)
 
 
+@pytest.mark.parametrize(('rate', 'most'), [(0.05, 3.0), (0.1, 9.0), (0.6, 9.0), (0.6, 30.0)])
+def test_a_server_that_falls_behind_its_own_stamps_has_every_change_judged_as_it_was(rate, most):
+    """It is overloaded: what it has not written yet is in none of its messages, all of today."""
+    rig = Rig(0.02)
+    chance = np.random.default_rng(3)
+    worst = 10.0 + most / rate  # then it stays so for 20 s, and catches up
+    n, put = 1, 0.0
+    while put < worst + 25.0 + most:
+        put += chance.uniform(0.02, 0.04)
+        lag = min(most, rate * max(put - 10.0, 0.0)) - 2.0 * max(put - worst - 20.0, 0.0)
+        due = []
+        while 0.02 * n <= put - max(lag, 0.0):
+            due.append(0.02 * n)
+            n += 1
+        rig.message(put + 0.002, put, *due)
+    taken = {stamp: values[X1] for stamp, values in rig.kept.rows}
+    for k in range(1, n):
+        assert taken[DAY0 + round(0.02 * k * NANO)] == 0.02 * k, 'not judged, or as a held value'
+    joiner = rig.feed.joiners['lv1']
+    assert len(rig.kept.rows) == n - 1 and joiner.tally.overtaken == 0
+    assert joiner.lateness(rig.feed.at) > 0.9 * min(most, 3.0), 'and that is told'
+
+
+def test_changes_that_nobody_could_expect_so_late_are_counted():
+    rig = Rig(0.02)
+    for n in range(1, 200):
+        rig.message(0.02 * n, 0.02 * n, 0.02 * n)
+    for n in range(200, 300):  # the device is held up, its server is not
+        rig.message(0.02 * n, 0.02 * n)
+    late = [0.02 * n for n in range(200, 300)]
+    rig.message(6.0, 6.0, *late)
+    tally = rig.feed.joiners['lv1'].tally
+    taken = {stamp: values[X1] for stamp, values in rig.kept.rows}
+    judged = sum(taken[DAY0 + round(t * NANO)] == t for t in late)
+    assert tally.overtaken == len(late) - judged > 0
+    assert (np.diff(rig.kept.stamps) > 0).all()
+
+
+@pytest.mark.parametrize('back', [3600.0, 7.0])
+def test_a_clock_set_back_while_a_valve_is_at_rest_loses_no_change(back):
+    """Its own stamps alone do not tell: the last change is older than the step."""
+    rig = Rig(1.0)
+    rig.message(0.1, 0.1, 0.0, value=0.5)
+    for k in range(1, 9000):
+        rig.message(0.5 * k, 0.5 * k)
+    for k in range(9000, 9100):
+        put = 0.5 * k - back
+        changes = [put - 0.1] if k >= 9010 and k % 2 else []
+        rig.message(0.5 * k, put, *changes)
+    rows = dict(rig.kept.rows)
+    lost = [
+        k
+        for k in range(9011, 9100, 2)
+        if rows.get(DAY0 + round((0.5 * k - back - 0.1) * NANO), [0, 0])[X1]
+        != pytest.approx(0.5 * k - back - 0.1)
+    ]
+    assert not lost
+    assert rig.feed.joiners['lv1'].tally.steps == 1
+
+
 def test_a_value_that_does_not_change_is_held_as_far_as_the_server_has_spoken():
     rig = Rig(0.02)
     rig.message(0.1, 0.1, 0.1)

@@ -16,8 +16,9 @@ from damadics_fd.ros.diagnostics import Report
 
 from damadics_connect.files.follow import Folder, FollowError, GrowingCsv, Row
 from damadics_connect.health import report
-from damadics_connect.joining import NANO, Joiner
+from damadics_connect.joining import Joiner
 from damadics_connect.publishing import Output
+from damadics_connect.source_clock import NANO
 from damadics_connect.valve_list import ValveSource
 
 LOOK = 0.1  # s between two looks at the files

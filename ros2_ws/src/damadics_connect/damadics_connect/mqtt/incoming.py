@@ -15,7 +15,7 @@ from damadics_fd.core.sample import SIGNALS
 from damadics_fd.ros.diagnostics import Report
 
 from damadics_connect.health import report
-from damadics_connect.joining import NANO, Joiner
+from damadics_connect.joining import Joiner
 from damadics_connect.mqtt.broker import PAUSES, Broker, why
 from damadics_connect.mqtt.json_sample import field_at, limited, number_or_word, parsed
 from damadics_connect.mqtt.sparkplug import (
@@ -26,6 +26,7 @@ from damadics_connect.mqtt.sparkplug import (
     write_payload,
 )
 from damadics_connect.publishing import Output
+from damadics_connect.source_clock import NANO
 from damadics_connect.valve_list import ValveSource
 
 UNITS = {'s': NANO, 'ms': 1_000_000, 'us': 1000, 'ns': 1}
@@ -114,6 +115,7 @@ class Incoming:
             self._output,
             {'Broker': self._broker.shown, 'Messages': self._messages},
             problems,
+            time.monotonic_ns(),
         )
 
     async def _follow(self, client: Client) -> None:

@@ -8,11 +8,12 @@ from typing import NamedTuple
 
 from damadics_fd.core.sample import SIGNALS
 
-from damadics_connect.joining import NANO, Joiner
+from damadics_connect.joining import Joiner
 from damadics_connect.opcua.horizon import Horizon
 from damadics_connect.opcua.values import status_of
 from damadics_connect.opcua.wire import Changes
 from damadics_connect.publishing import Output
+from damadics_connect.source_clock import NANO
 from damadics_connect.valve_list import ValveSource
 
 SHORTEST_INTERVAL, LONGEST_INTERVAL = 0.02, 0.5  # s between two messages of the server
@@ -61,6 +62,7 @@ class Feed:
         self.tick = min(max(self.interval / 2.0, 0.01), 0.1)  # s between two looks
         self.queue = options.queue or round((self.interval + HELD_UP) / period) + 2
         self.heard = 0.0  # monotonic time of the last word [s]
+        self.at = 0  # the same as `hear` returned it [ns]
         self.lost = 0  # values that the server's queue had no room for
         self.items: list[Item] = []
         self.nodes: list[str] = []
@@ -106,7 +108,12 @@ class Feed:
         """
         self.heard = now / NANO
         pace = int(self.patience * NANO)
-        return self._horizon.heard(published if self.prompt else 0, now, pace)
+        before = self._horizon.steps_back
+        self.at = self._horizon.heard(published if self.prompt else 0, now, pace)
+        if self._horizon.steps_back > before:
+            for joiner in self.joiners.values():
+                joiner.server_set_back()
+        return self.at
 
     def take(self, changes: Changes, wall: int, at: int) -> None:
         """

@@ -29,6 +29,7 @@ class Horizon:
         self._offset: int | None = None  # server's clock less ours, at the least delay
         self._lately: int | None = None  # the same in the present window
         self._window = self._published = 0
+        self.steps_back = 0  # of the server's clock
 
     @property
     def known(self) -> int:
@@ -59,6 +60,7 @@ class Horizon:
             return self._at
         offset = published - now
         if published < self._published:  # the server's clock was set back
+            self.steps_back += published < self._published - JITTER
             self._offset = self._lately = None
         pause = published - self._published
         self._published = published

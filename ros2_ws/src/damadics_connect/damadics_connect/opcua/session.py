@@ -4,6 +4,7 @@
 
 import asyncio
 import contextlib
+from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,6 +18,8 @@ MODES = ('Sign', 'SignAndEncrypt')
 APPLICATION = 'urn:damadics:connect'
 PATIENCE = 4.0  # s for an answer
 LEAVE = 1.0  # s to take leave of a server
+MOST_PATIENCE = 32.0  # s, after some failures: the server may only be slow
+PAUSES = (0.2, 0.5, 1.0, 2.0, 5.0)  # s before a server is tried again
 STANDSTILL = 5.0  # s that a server may stand still before the library ends the session
 REMEDIES = {
     'BadUserAccessDenied': 'wrong user name or password',
@@ -167,3 +170,61 @@ async def close_session(client: Client) -> None:
         await asyncio.wait_for(client.disconnect(), LEAVE)
     if client.uaclient.protocol is not None and client.uaclient.protocol.transport is not None:
         client.uaclient.protocol.transport.abort()
+
+
+class Connection:
+    """
+    A session that is opened again, for ever, whenever it was lost.
+
+    :param endpoint: the server.
+    :param use: what is done with a session until it ends; it says `works` when all is set up.
+    :param log: takes what a person should know.
+    :param lost: what it means that there is no session, such as "not connected".
+    """
+
+    def __init__(
+        self,
+        endpoint: Endpoint,
+        use: Callable[[Client], Awaitable[None]],
+        log: Callable[[str], None],
+        lost: str,
+    ) -> None:
+        self.fault = 'not connected yet'
+        self.place = shown(endpoint.url)
+        self._endpoint = endpoint
+        self._use = use
+        self._log = log
+        self._lost = lost
+        self._failures = 0
+
+    def works(self) -> None:
+        """Say that the session does what it was opened for."""
+        self.fault = ''
+        self._failures = 0
+
+    def fails(self, cause: str) -> None:
+        """
+        Tell that it does not, once for each cause.
+
+        :param cause: with the server's name.
+        """
+        if cause != self.fault:
+            self._log(f'{self._lost}: {cause}')
+        self.fault = cause
+
+    async def run(self) -> None:
+        """Have a session for ever."""
+        while True:
+            patience = min(PATIENCE * 2**self._failures, MOST_PATIENCE)
+            try:
+                client = await open_session(self._endpoint, patience)
+                try:
+                    await self._use(client)
+                finally:
+                    await close_session(client)
+            except SessionError as problem:
+                self.fails(str(problem))
+            except (ua.UaError, OSError, TimeoutError) as problem:
+                self.fails(f'{self.place}: {why(problem)}')
+            await asyncio.sleep(PAUSES[min(self._failures, len(PAUSES) - 1)])
+            self._failures = min(self._failures + 1, len(PAUSES))

@@ -14,24 +14,15 @@ from damadics_fd.ros.diagnostics import Report
 from damadics_connect.health import report, some
 from damadics_connect.opcua.feed import Feed, Item, Options
 from damadics_connect.opcua.node_ids import nanoseconds_of, node_of
-from damadics_connect.opcua.session import (
-    PATIENCE,
-    Endpoint,
-    SessionError,
-    close_session,
-    open_session,
-    why,
-)
+from damadics_connect.opcua.session import Connection, Endpoint, SessionError
 from damadics_connect.opcua.wire import Changes, WireError, read_changes
 from damadics_connect.publishing import Output
-from damadics_connect.settings import shown
 from damadics_connect.valve_list import ValveSource
 
 HELD_UP = 0.5  # s that our own process may be late before its lateness counts
 QUIET = 1.6  # s without a word, beside its usual time, after which the server counts as gone
 GIVE_UP = 5.0  # s without a word after which the session is ended: until then it may go on, and
 # what the server has kept of its changes with it
-PAUSES = (0.2, 0.5, 1.0, 2.0, 5.0)  # s before it is tried again
 AT_ONCE = 1000  # monitored items of one request
 CANNOT_SUBSCRIBE = (ua.uaerrors.BadServiceUnsupported, ua.uaerrors.BadNotImplemented)
 BAD = 0x80000000
@@ -57,7 +48,7 @@ class Source:
         output: Output,
         log: Log,
     ) -> None:
-        self._endpoint = endpoint
+        self._connection = Connection(endpoint, self._follow, log, 'not connected')
         self._poll = options.poll
         self._output = output
         self._log = log
@@ -67,41 +58,18 @@ class Source:
         self._feeds = [Feed(period, group, options, output) for period, group in by_period.items()]
         self._joiners = {n: joiner for feed in self._feeds for n, joiner in feed.joiners.items()}
         self._ended = False  # the server has ended a subscription
-        self._followed = False  # in this session
-        self._fault = 'not connected yet'
         self._unknown: dict[str, str] = {}
         self._sessions = self._values = self._garbled = 0
 
     async def run(self) -> None:
         """Follow the server for ever; connect again whenever it was lost."""
-        failures = 0
-        while True:
-            self._followed = False
-            try:
-                # more patience each time: the server may only be slow
-                client = await open_session(self._endpoint, PATIENCE * 2 ** min(failures, 3))
-                try:
-                    self._sessions += 1
-                    await self._follow(client)
-                finally:
-                    await close_session(client)
-            except SessionError as problem:
-                reason = str(problem)
-            except (ua.UaError, OSError, TimeoutError) as problem:
-                reason = f'{shown(self._endpoint.url)}: {why(problem)}'
-            if self._followed:
-                failures = 0
-            if reason != self._fault:
-                self._log(f'not connected: {reason}')
-            self._fault = reason
-            await asyncio.sleep(PAUSES[min(failures, len(PAUSES) - 1)])
-            failures += 1
+        await self._connection.run()
 
     def report(self) -> Report:
         """Say how the server and the valves are."""
         values = {
-            'Server': shown(self._endpoint.url),
-            'Connected': not self._fault,
+            'Server': self._connection.place,
+            'Connected': not self._connection.fault,
             'Sessions': self._sessions,
             'Values': self._values,
             'Values lost by the server': sum(feed.lost for feed in self._feeds),
@@ -109,10 +77,13 @@ class Source:
         }
         unknown = [f'{node} ({cause})' for node, cause in self._unknown.items()]
         problems = [f'no such node: {some(unknown)}'] if unknown else []
-        return report(self._fault, self._joiners, self._output, values, problems)
+        now = min(feed.at for feed in self._feeds)
+        fault = self._connection.fault
+        return report(fault, self._joiners, self._output, values, problems, now)
 
     async def _follow(self, client: Client) -> None:
         """Subscribe to everything, then look after it until the server falls silent."""
+        self._sessions += 1
         self._ended = False
         self._unknown.clear()
         spaces = await client.get_namespace_array()
@@ -121,8 +92,8 @@ class Source:
             feed.begin(time.monotonic_ns())
             if self._poll or not await self._subscribe(client, feed, spaces):
                 polled.append(asyncio.create_task(self._read_on(client, feed, spaces)))
-        self._followed, self._fault = True, ''
-        self._log(f'connected to {shown(self._endpoint.url)}: {len(self._joiners)} valve(s)')
+        self._connection.works()
+        self._log(f'connected to {self._connection.place}: {len(self._joiners)} valve(s)')
         if self._unknown:
             self._log(f'no such node: {some([f"{n} ({c})" for n, c in self._unknown.items()])}')
         tick = min(feed.tick for feed in self._feeds)
@@ -136,9 +107,8 @@ class Source:
                     for feed in self._feeds:
                         feed.heard += held_up  # it is us who were: what has come waits to be read
                 if self._ended:
-                    raise SessionError(
-                        f'{shown(self._endpoint.url)}: the server has ended our subscription'
-                    )
+                    place = self._connection.place
+                    raise SessionError(f'{place}: the server has ended our subscription')
                 self._tell_silence()
                 for task in polled:
                     if task.done():
@@ -158,17 +128,16 @@ class Source:
 
         :raises SessionError: where it has been silent for too long.
         """
-        now, place = time.monotonic(), shown(self._endpoint.url)
+        now, connection = time.monotonic(), self._connection
         silent = max(now - feed.heard - max(feed.interval, feed.patience) for feed in self._feeds)
-        reason = f'{place}: silent for {QUIET:g} s and more: server or network is gone'
+        cause = f'{connection.place}: silent for {QUIET:g} s and more: server or network is gone'
         if silent > GIVE_UP:
-            raise SessionError(reason)
-        if silent > QUIET and not self._fault:
-            self._fault = reason
-            self._log(f'not connected: {reason}')
-        elif silent <= QUIET and self._fault:
-            self._fault = ''
-            self._log(f'connected to {place} again')
+            raise SessionError(cause)
+        if silent > QUIET:
+            connection.fails(cause)
+        elif connection.fault:
+            connection.works()
+            self._log(f'connected to {connection.place} again')
 
     async def _subscribe(self, client: Client, feed: Feed, spaces: list[str]) -> bool:
         """Make the subscription of a feed; False where the server has none."""

@@ -16,20 +16,12 @@ from rclpy.node import Node as RosNode
 from damadics_connect.health import some
 from damadics_connect.judgement import Judgement
 from damadics_connect.opcua.node_ids import node_of
-from damadics_connect.opcua.session import (
-    Endpoint,
-    SessionError,
-    close_session,
-    open_session,
-    why,
-)
+from damadics_connect.opcua.session import Connection, Endpoint
 from damadics_connect.opcua.written.nodes import PlantNode, Value, fitted, wanted_type
-from damadics_connect.settings import shown
 from damadics_connect.watch import Watch
 
 LOOK = 0.1  # s between two looks at what has changed
 NUMBERS = 1.0  # s between two updates of running numbers, and beats
-PAUSES = (0.5, 1.0, 2.0, 5.0)  # s before the server is tried again
 LAST_WORD = 1.0  # s for the last values when this process ends
 AT_ONCE = 500  # values of one request
 CURRENT_WRITE = 0x02  # of an access level
@@ -65,7 +57,7 @@ class PlantWriter:
         node: RosNode,
         log: Callable[[str], None],
     ) -> None:
-        self._endpoint = endpoint
+        self._connection = Connection(endpoint, self._use, log, 'judgements are not written')
         self._nodes = nodes
         self._log = log
         self._watch = Watch(node, lambda judgement: self._changed.add(judgement.valve))
@@ -73,42 +65,29 @@ class PlantWriter:
         self._written: dict[PlantNode, Value] = {}
         self._refused: dict[PlantNode, str] = {}
         self._told: dict[PlantNode, str] = {}
-        self._fault = 'not connected yet'
         self._count = 0
 
     async def run(self) -> None:
         """Write for ever; connect again whenever the server was lost."""
-        failures = 0
-        while True:
-            try:
-                client = await open_session(self._endpoint)
-                try:
-                    places = await self._find(client)
-                    self._fault, failures = '', 0
-                    await self._write_on(client, places)
-                finally:
-                    await close_session(client)
-            except SessionError as problem:
-                reason = str(problem)
-            except (ua.UaError, OSError, TimeoutError) as problem:
-                reason = f'{shown(self._endpoint.url)}: {why(problem)}'
-            if reason != self._fault:
-                self._log(f'judgements are not written: {reason}')
-            self._fault = reason
-            await asyncio.sleep(PAUSES[min(failures, len(PAUSES) - 1)])
-            failures += 1
+        await self._connection.run()
+
+    async def _use(self, client: Client) -> None:
+        """Write in one session, until it ends."""
+        places = await self._find(client)
+        self._connection.works()
+        await self._write_on(client, places)
 
     def report(self) -> Report:
         """Say how it is."""
         refused = [f'{node.name} ({cause})' for node, cause in self._refused.items()]
         values = {
-            'Server': shown(self._endpoint.url),
+            'Server': self._connection.place,
             'Nodes': len(self._nodes),
             'Nodes refused': len(refused),
             'Values written': self._count,
         }
-        if self._fault:
-            return Level.ERROR, self._fault, values
+        if self._connection.fault:
+            return Level.ERROR, self._connection.fault, values
         if refused:
             return Level.WARN, f'not written: {some(refused)}', values
         return Level.OK, f'{len(self._nodes)} node(s) are written', values
@@ -137,7 +116,7 @@ class PlantWriter:
             else:
                 places.append(Place(node, nodeid, kind))
         self._tell_refused()
-        self._log(f'writing judgements to {len(places)} node(s) of {shown(self._endpoint.url)}')
+        self._log(f'writing judgements to {len(places)} node(s) of {self._connection.place}')
         return places
 
     async def _kind(self, client: Client, nodeid: ua.NodeId) -> ua.VariantType | str:
@@ -161,7 +140,8 @@ class PlantWriter:
         """Tell the log what is new among the refused."""
         new = [f'{n.name} ({c})' for n, c in self._refused.items() if self._told.get(n) != c]
         if new:
-            self._log(f'not written: {some(new)}; all others are')
+            others = len(self._refused) < len(self._nodes)
+            self._log(f'not written: {some(new)}; {"all others are" if others else "no other is"}')
         self._told = dict(self._refused)
 
     async def _write_on(self, client: Client, places: Sequence[Place]) -> None:
