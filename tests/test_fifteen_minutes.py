@@ -125,7 +125,7 @@ def faulted(first):
     first.early = rises(first)
     answer = first.peer.call(InjectFault, f'/{VALVE}/inject_fault', fault=FRICTION, strength=1.0)
     assert answer.success
-    assert first.peer.wait(lambda: first.flags[-1].fault, 30.0), 'the friction is not flagged'
+    assert first.peer.wait(lambda: first.flags[-1].fault), 'the friction is not flagged'
     first.shown_after = first.tile.wait(website.ALARM)
     assert first.peer.wait(lambda: rises(first))
     return first
@@ -141,7 +141,7 @@ def restarted(faulted):
     faulted.peer.wait(lambda: False, 0.3)
     before = len(faulted.flags)
     faulted.tile.wait(website.ALARM, 60.0)  # `run` has started it again
-    assert faulted.peer.wait(lambda: len(faulted.flags) > before + 2, 30.0)
+    assert faulted.peer.wait(lambda: len(faulted.flags) > before + 2)
     faulted.since = list(faulted.flags[before:])
     return faulted
 

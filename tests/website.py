@@ -106,6 +106,19 @@ class Tile:
         """Wait until the tile is of one of the kinds and return how long that took."""
         began = time.monotonic()
         while (kind := self.kind()) not in kinds:
-            assert time.monotonic() - began < patience, f'the tile is {kind}, not {kinds}'
+            assert time.monotonic() - began < patience, (
+                f'the tile is {kind}, not {kinds}: {self.account()}'
+            )
             time.sleep(0.02)
         return time.monotonic() - began
+
+    def account(self) -> str:
+        """Tell what the page shows of the valve, and what its server would show."""
+        words = ''
+        if self._page:
+            words = self._page.evaluate(
+                f"document.querySelector('[data-valve={self._valve}]')?.innerText"
+                " + ' (link ' + document.body.dataset.link + ')'"
+            )
+        with urllib.request.urlopen(f'{self._address}/state', timeout=5.0) as answer:
+            return f'{words!r}; the server says {answer.read().decode()}'

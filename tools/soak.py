@@ -13,7 +13,6 @@ Exit code 1 where memory grows after the first half, an alarm was raised, or a s
 import argparse
 import json
 import os
-import random
 import signal
 import socket
 import subprocess
@@ -26,6 +25,7 @@ from pathlib import Path
 import numpy as np
 import yaml
 from ament_index_python.packages import get_package_prefix
+from damadics_bringup.processes import free_domain, surroundings
 from damadics_fd.bag.columns import read_columns
 from damadics_fd.bag.errors import BagError
 from damadics_msgs.msg import FaultEvent
@@ -35,6 +35,7 @@ RATE = 100.0  # Hz
 GROWTH = 0.03  # of a process's memory in the second half
 SMALL = 8_000_000  # bytes per hour, that are not called growth
 LOOK = 5.0  # s
+TELL = 300.0  # s between two lines about memory
 FACTOR = 10.0
 CHROMIUM = '/usr/bin/chromium'
 
@@ -121,8 +122,7 @@ def soak(folder: Path, minutes: float, factor: float) -> list[str]:
     words = ['--simulate', '--dashboard', '--port', str(port), '--record', str(folder / 'bag')]
     environment = {
         **os.environ,
-        'ROS_DOMAIN_ID': str(random.SystemRandom().randint(1, 99)),
-        'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
+        **surroundings(free_domain()),
         'XDG_STATE_HOME': str(folder / 'state'),
     }
     found = []
@@ -137,6 +137,7 @@ def soak(folder: Path, minutes: float, factor: float) -> list[str]:
         opened = pages(stack, f'http://127.0.0.1:{port}')
         began = time.monotonic()
         known = family(process.pid)
+        told = -TELL
         while (passed := time.monotonic() - began) < 60.0 * minutes:
             time.sleep(min(LOOK, 60.0 * minutes - passed + 0.1))
             if process.poll() is not None:
@@ -149,6 +150,10 @@ def soak(folder: Path, minutes: float, factor: float) -> list[str]:
                 known = now
             for number, name in now.items():
                 history.setdefault(name, []).append((passed, resident(number)))
+            if passed - told >= TELL:
+                told = passed
+                sizes = (f'{name} {series[-1][1] / 1e6:.1f}' for name, series in history.items())
+                print(f'{passed / 60.0:5.1f} min, MB:', *sizes, flush=True)
         process.send_signal(signal.SIGINT)
         process.wait(120.0)
     for name, series in history.items():

@@ -12,6 +12,7 @@ from damadics_bringup.launcher import arguments_of
 from damadics_bringup.processes import parameters
 from damadics_fd.nodes import second_publisher
 from damadics_fd.ros import qos
+from damadics_fd.ros.conversions import nanoseconds
 from damadics_fd.ros.entities import Entities
 from damadics_msgs.msg import Estimate, FaultFlag, OperatorAction
 from damadics_msgs.srv import Acknowledge, Reference, ResetAlarm, Shelve
@@ -95,21 +96,22 @@ def test_samples_that_waited_are_not_healthy(processes, peer):
     ages = []
 
     def note(flag: FaultFlag) -> None:
-        stamp = flag.header.stamp.sec + 1e-9 * flag.header.stamp.nanosec
-        ages.append((flag.state, valve.stamp * 1e-9 - stamp))
+        ages.append((flag.state, (valve.stamp - nanoseconds(flag.header.stamp)) * 1e-9))
 
     valve.peer.node.create_subscription(FaultFlag, 'fault_flag', note, qos.FLAG)
     await_state(valve, HEALTHY, 90.0)
     # an age is counted from the shortest way so far: that of the start may be long
     assert valve.run_until(lambda: any(age < 0.3 for _, age in ages))
     os.kill(processes.pid('estimator'), signal.SIGSTOP)
+    assert valve.run_until(lambda: valve.flags[-1].state == FaultFlag.STATE_NOT_MONITORING)
     valve.run(5.0)
-    ages.clear()
+    before = len(ages)
     os.kill(processes.pid('estimator'), signal.SIGCONT)
     await_state(valve, HEALTHY, 90.0)
     valve.run(1.0)
-    assert ages[0][0] == FaultFlag.STATE_NOT_MONITORING
-    assert max((age for state, age in ages if state == HEALTHY), default=0.0) < 2.5
+    assert HEALTHY in {state for state, _ in ages[before:]}
+    # 2 s, and what this process may have been held up; the oldest that waited are 5 s old
+    assert max(age for state, age in ages if state == HEALTHY) < 4.0
 
 
 def test_dated_samples_that_are_old_are_not_healthy_and_say_why(processes, peer):

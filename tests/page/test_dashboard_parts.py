@@ -20,7 +20,14 @@ from damadics_dashboard.words.texts import texts
 from damadics_dashboard.words.valve_words import alarm_words, history_rows
 from damadics_fd.core.settings import SettingsError
 from damadics_fd.store.access import Access, Grant, Role
-from damadics_msgs.msg import FaultEvent, FaultFlag, FleetLayout, Isolation, Measurement
+from damadics_msgs.msg import (
+    FaultEvent,
+    FaultFlag,
+    FleetLayout,
+    Float64Stamped,
+    Isolation,
+    Measurement,
+)
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rclpy.serialization import serialize_message
@@ -139,6 +146,28 @@ def test_a_queue_that_grows_shows_although_stamps_count_from_the_start_of_a_run(
         message.header.stamp.sec = 10 + step
         valve.take_flag(message, 100.0 + 1.5 * step)  # half a second later each time
     assert valve.condition(113.6, 0).detail == 'samples_old'
+
+
+@pytest.mark.parametrize('followed', [True, False])
+@pytest.mark.parametrize('state', [FaultFlag.STATE_NOT_MONITORING, FaultFlag.STATE_UNKNOWN])
+def test_a_valve_is_not_old_because_its_detector_was_there_first(followed, state):
+    """Flags of before the first sample are stamped 0; the plant starts 5 s later."""
+    valve = Valve('lv101')
+    for step in range(6):
+        valve.take_flag(flag(state), 100.0 + step)
+    assert valve.age(105.0, 0) is None, 'no sample yet'
+    for step in range(1, 4):
+        now = 105.0 + step
+        if followed:
+            limit = Float64Stamped(data=0.2)
+            limit.header.stamp.sec = step
+            valve.batches['threshold'].take(serialize_message(limit))
+            valve.collect(now)
+        message = flag(FaultFlag.STATE_HEALTHY)
+        message.header.stamp.sec = step
+        valve.take_flag(message, now)
+        assert valve.condition(now + 0.1, 0).kind == 'ok'
+        assert valve.age(now + 0.1, 0) == pytest.approx(0.1)
 
 
 def test_a_silent_valve_keeps_its_open_alarm():

@@ -22,16 +22,16 @@ class Ages:
         self._stamps: dict[str, int] = {}
         self._steps: dict[str, float] = {}  # largest of late [s]
 
-    def heard(self, valve: str, stamp: int, steady: float) -> None:
+    def heard(self, valve: str, stamp: int | None, steady: float) -> None:
         """
         Note a judgement.
 
         :param valve: its name.
-        :param stamp: of the measurement that it rests on [ns].
+        :param stamp: of the measurement that it rests on [ns]; None where it rests on none.
         :param steady: time of a clock that is never set [s].
         """
         before = self._stamps.get(valve)
-        if stamp == before:
+        if stamp is None or stamp == before:
             return
         if before is not None and stamp > before:
             step = (stamp - before) / SECOND

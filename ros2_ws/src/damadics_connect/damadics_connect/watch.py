@@ -9,6 +9,7 @@ from dataclasses import replace
 
 from damadics_fd.core.text import NAME, plain
 from damadics_fd.ros import qos
+from damadics_fd.ros.conversions import judged_stamp
 from damadics_msgs.msg import FaultEvent, FaultFlag, FleetEvent, FleetLayout, FleetStatus
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
@@ -95,7 +96,7 @@ class Watch:
         def take_flag(message: FaultFlag) -> None:
             now = time.monotonic()
             judgement = with_flag(self.valves.get(name, Judgement(name)), message, now)
-            self._ages.heard(name, judgement.stamp, now)
+            self._ages.heard(name, judged_stamp(message), now)
             old = self._ages.old(name, self._node.get_clock().now().nanoseconds, now)
             self._change(judgement.silent() if old else judgement)
 

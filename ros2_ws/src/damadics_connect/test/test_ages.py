@@ -7,6 +7,8 @@ import pytest
 pytest.importorskip('rclpy')
 from damadics_connect.ages import Ages
 from damadics_connect.judgement import Judgement
+from damadics_fd.ros.conversions import judged_stamp
+from damadics_msgs.msg import FaultFlag
 
 SECOND = 10**9
 TODAY = 1_790_000_000 * SECOND
@@ -38,6 +40,19 @@ def test_a_lasting_delay_shows_and_other_valves_are_not_concerned():
     assert ages.old('late', TODAY + 9 * SECOND, 9.0)
     assert not ages.old('good', TODAY + 9 * SECOND, 9.0)
     assert not ages.old('unheard', TODAY, 9.0)
+
+
+def test_flags_of_before_the_first_sample_make_no_later_one_old():
+    ages = Ages()
+    for second in range(6):
+        flag = FaultFlag(state=FaultFlag.STATE_NOT_MONITORING)
+        ages.heard('lv1', judged_stamp(flag), float(second))
+    for second in range(6, 12):
+        flag = FaultFlag(state=FaultFlag.STATE_HEALTHY)
+        flag.header.stamp.sec = second - 5
+        ages.heard('lv1', judged_stamp(flag), float(second))
+        assert not ages.old('lv1', 0, second + 0.1)
+    assert ages.old('lv1', 0, 80.0)
 
 
 @pytest.mark.parametrize(

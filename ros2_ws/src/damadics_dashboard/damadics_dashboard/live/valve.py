@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from damadics_fd.core.stamps import SECOND as NANO
 from damadics_fd.core.text import NAME, plain
+from damadics_fd.ros.conversions import judged_stamp
 from damadics_fd.ros.freshness import Freshness, default_max_age
 from damadics_msgs.msg import FaultEvent, FaultFlag, Isolation, Signature
 
@@ -78,7 +79,7 @@ class Valve:
         self.flag: FaultFlag | None = None
         self.flag_at = -1e9
         self.threshold_at = -1e9
-        self.judged = -1  # ns, stamp of the flag
+        self.judged = -1  # ns, stamp of the flag that its age was last counted from
         self.freshness = Freshness(simulated)
         self.signature: Signature | None = None
         self.isolation: Isolation | None = None
@@ -153,10 +154,10 @@ class Valve:
         if flag.header.frame_id and not self._configured:
             self.tag = plain(flag.header.frame_id, NAME)
         self.flag, self.flag_at = flag, now
-        stamp = flag.header.stamp.sec * NANO + flag.header.stamp.nanosec
-        if self.threshold_at < 0.0 and stamp != self.judged:
+        stamp = judged_stamp(flag)
+        if stamp is not None and self.threshold_at < 0.0 and stamp != self.judged:
             self.freshness.heard(stamp, now)
-        self.judged = stamp
+            self.judged = stamp
 
     def take_tag(self, tag: str) -> None:
         """
@@ -213,10 +214,9 @@ class Valve:
         :param clock: ROS time [ns].
         :return: [s], None where there has been none.
         """
-        if self.flag is None and self.threshold_at < 0.0:
-            return None
+        old = self.freshness.age(clock, now)
         arrived = now - max(self.threshold_at, self.flag_at)
-        return max(arrived, self.freshness.age(clock, now), 0.0)
+        return None if math.isinf(old) else max(arrived, old, 0.0)
 
     @property
     def progress(self) -> float:
@@ -275,7 +275,7 @@ class Valve:
         if heard and quiet > max(1.0, 3.0 * self.period):
             return Condition('off', 'not_monitored', 'no_sample', quiet)
         old = self.freshness.age(clock, now)
-        if old > default_max_age(self.period) and not refused:
+        if default_max_age(self.period) < old < math.inf and not refused:
             return Condition('off', 'not_monitored', 'samples_old', old)
         return None
 

@@ -67,13 +67,15 @@ class Freshness:
         if before is None or stamp < before - BACK * SECOND or is_date(before) != is_date(stamp):
             self._least = delay
             self._pause = 0.0
-        elif (gap := steady - self._steady) > max(INTERRUPTED, MISSED * self._usual):
-            self._pause += max(delay - self._delay, 0.0)
-            self._begin_window(steady, math.inf)
-        elif self._usual < math.inf:
-            self._usual += 0.2 * (gap - self._usual)
         else:
-            self._usual = gap
+            gap, known = steady - self._steady, self._usual < math.inf
+            if gap > max(INTERRUPTED, MISSED * self._usual if known else 0.0):
+                self._pause += max(delay - self._delay, 0.0)
+                self._begin_window(steady, math.inf)
+            elif known:
+                self._usual += 0.2 * (gap - self._usual)
+            if not known:
+                self._usual = gap
         self._least = min(self._least, delay)
         self._delay, self._steady = delay, steady
         if self._pause > 0.0:

@@ -92,6 +92,19 @@ def test_slow_sources_may_pause_too(period):
     assert fresh.age(0, now) == pytest.approx(0.0, abs=0.1)
 
 
+@pytest.mark.parametrize('period', [0.005, 1.0, 10.0])
+def test_a_source_that_pauses_after_its_first_sample_is_fresh_again_after_a_while(period):
+    fresh = Freshness()
+    fresh.heard(0, 0.0)
+    ages = []
+    for n in range(1, 2000 if period < 1.0 else 20):
+        now = 7.0 + 3.0 * period + n * period
+        fresh.heard(int(n * period * SECOND), now)
+        ages.append(fresh.age(0, now))
+    assert ages[0] > 6.5
+    assert ages[-1] == pytest.approx(0.0, abs=0.1)
+
+
 def test_another_run_begins_anew():
     fresh = Freshness()
     for n in range(200):

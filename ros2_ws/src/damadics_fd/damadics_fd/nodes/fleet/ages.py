@@ -64,13 +64,13 @@ class Ages:
             self._stamp[v], self._delay[v], self._steady[v] = now, delay, steady
             return
         known = np.isfinite(usual)
-        paused = ~first & (gap > np.maximum(INTERRUPTED, MISSED * usual))
+        usually = np.where(known, usual, 0.0)
+        paused = ~first & (gap > np.maximum(INTERRUPTED, MISSED * usually))
         pause = np.where(first, 0.0, self._pause[v])
         self._pause[v] = pause + np.where(paused, np.maximum(delay - self._delay[v], 0.0), 0.0)
         self._begin_window(v[paused], steady, np.full(int(paused.sum()), np.inf))
-        learns = ~first & ~paused
-        usual = np.where(learns & known, usual + 0.2 * (gap - np.where(known, usual, 0.0)), usual)
-        self._usual[v] = np.where(learns & ~known, gap, usual)
+        usual = np.where(~first & ~paused & known, usual + 0.2 * (gap - usually), usual)
+        self._usual[v] = np.where(~first & ~known, gap, usual)
         self._least[v] = np.minimum(np.where(first, delay, self._least[v]), delay)
         self._stamp[v], self._delay[v], self._steady[v] = now, delay, steady
         self._forgive(v[self._pause[v] > 0.0], steady)
