@@ -18,7 +18,7 @@ from rclpy.experimental import EventsExecutor
 from rclpy.qos import QoSProfile
 
 QUIET = 0.012  # s that the loop of `promised` takes on the machine that the times are promised on
-PATIENCE = 60.0  # s for what takes a second or two: a busy machine is no failure
+PATIENCE = 120.0  # s for what takes a second or two: a busy machine is no failure
 
 
 class Peer:

@@ -26,6 +26,7 @@ class Valve:
         self.peer = peer
         self.stamp = PERIOD
         self.next = self.zero = 0
+        self.sent: list[int] = []  # stamps
         self.flags = peer.listen(FaultFlag, 'fault_flag', qos.FLAG)
         self.events = peer.listen(FaultEvent, 'fault_event', qos.EVENTS)
         self.reports = peer.listen(DiagnosticArray, '/diagnostics', QoSProfile(depth=100))
@@ -43,6 +44,7 @@ class Valve:
                 x1 = 0.5 + (0.1 * (self.stamp // (20 * PERIOD) % 2) if throw else 0.0)
                 cv = 0.3 + 0.4 * (self.stamp // 10**9 % 2) if swing else 0.5
                 self.peer.send(self.stamp, cv, x1)
+                self.sent.append(self.stamp)
                 self.stamp += PERIOD
             self.next = self.stamp
             self.peer.wait(lambda: False, PERIOD * 1e-9)
@@ -64,15 +66,18 @@ class Valve:
         """Call a service, samples going on."""
         return self.peer.call(kind, name, self.run_until, **request)
 
+    def told(self, node: str) -> list:
+        """Return the diagnostic status of a node as often as it was told."""
+        return [s for m in self.reports for s in m.status if s.name.startswith(f'{node}:')]
+
     def report(self, node: str):
-        """Return the latest diagnostic status of a node."""
-        found = [s for m in self.reports for s in m.status if s.name.startswith(f'{node}:')]
-        return found[-1] if found else None
+        """Return the latest diagnostic status of a node; send samples until there is one."""
+        assert self.run_until(lambda: self.told(node)), f'no diagnostics of {node}'
+        return self.told(node)[-1]
 
     def says(self, node: str, text: str) -> bool:
         """Tell whether the latest status of a node has a text in its message."""
-        status = self.report(node)
-        return status is not None and text in status.message
+        return any(text in status.message for status in self.told(node)[-1:])
 
     def calm(self) -> None:
         """Bring the valve to health, whatever the test before has left."""

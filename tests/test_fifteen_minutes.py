@@ -140,7 +140,7 @@ def restarted(faulted):
     faulted.grey_after = faulted.tile.wait(('off',))
     faulted.peer.wait(lambda: False, 0.3)
     before = len(faulted.flags)
-    faulted.tile.wait(website.ALARM, 60.0)  # `run` has started it again
+    faulted.tile.wait(website.ALARM)  # `run` has started it again
     assert faulted.peer.wait(lambda: len(faulted.flags) > before + 2)
     faulted.since = list(faulted.flags[before:])
     return faulted

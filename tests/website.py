@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from conftest import PATIENCE
 
 PICTURES = os.environ.get('DAMADICS_SCREENSHOTS')  # folder to write pictures of the page to
 CHROMIUM = Path('/usr/bin/chromium')
@@ -45,7 +46,7 @@ def free_port() -> int:
         return probe.getsockname()[1]
 
 
-def wait_until_served(address: str, patience: float = 60.0) -> None:
+def wait_until_served(address: str, patience: float = PATIENCE) -> None:
     deadline = time.monotonic() + patience
     while time.monotonic() < deadline:
         try:
@@ -102,7 +103,7 @@ class Tile:
         with urllib.request.urlopen(f'{self._address}/state', timeout=5.0) as answer:
             return json.load(answer).get(self._valve, '')
 
-    def wait(self, kinds: tuple[str, ...], patience: float = 60.0) -> float:
+    def wait(self, kinds: tuple[str, ...], patience: float = PATIENCE) -> float:
         """Wait until the tile is of one of the kinds and return how long that took."""
         began = time.monotonic()
         while (kind := self.kind()) not in kinds:

@@ -5,6 +5,7 @@
 import pytest
 from damadics_bringup.processes import parameters
 from damadics_fd.ros import qos
+from damadics_fd.ros.conversions import nanoseconds
 from damadics_msgs.msg import Estimate, FaultFlag, Float64Stamped
 from driven_valve import SETTINGS, Valve
 from lifecycle_msgs.msg import Transition
@@ -42,10 +43,10 @@ def test_joined_nodes_are_two_nodes_to_everybody_else(processes, peer):
     }
     assert valve.run_until(lambda: all(heard.values()))
     valve.run(2.0)
-    peer.wait(lambda: False, 0.5)
     for topic, messages in heard.items():
-        stamps = [m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for m in messages]
-        assert stamps == list(range(stamps[0], valve.stamp, 10_000_000)), topic
+        assert peer.wait(lambda m=messages: nanoseconds(m[-1].header.stamp) == valve.sent[-1])
+        stamps = [nanoseconds(m.header.stamp) for m in messages]
+        assert stamps == valve.sent[valve.sent.index(stamps[0]) :], topic
         assert {m.header.frame_id for m in messages} == {'LC74_20'}
     assert valve.run_until(
         lambda: int(values(valve, 'detector').get('Estimates judged', 0)) >= len(heard['residual'])

@@ -99,12 +99,12 @@ def test_partial_strokes_end_with_the_measurement_and_are_refused_under_an_alarm
 def test_a_late_joiner_gets_the_flag_and_all_events(valve):
     valve.raise_alarm()
     assert valve.call(Acknowledge, 'acknowledge').success
+    assert valve.run_until(lambda: valve.events[-1].transition == FaultEvent.ACKNOWLEDGED)
     late_flags = valve.peer.listen(FaultFlag, 'fault_flag', qos.FLAG)
     late = valve.peer.listen(FaultEvent, 'fault_event', qos.EVENTS)
-    assert valve.run_until(lambda: late and late_flags)
-    transitions = [event.transition for event in late]
-    assert FaultEvent.RAISED in transitions
-    assert transitions[-1] == FaultEvent.ACKNOWLEDGED
+    last = str(valve.events[-1])  # a NaN is not equal to itself
+    assert valve.run_until(lambda: late and late_flags and str(late[-1]) == last)
+    assert FaultEvent.RAISED in {event.transition for event in late}
     assert late_flags[0].fault
 
 
@@ -265,7 +265,7 @@ def test_a_sample_a_second_is_no_silence_in_mode_scada(processes, peer):
         peer.wait(lambda: False, 1.0)
     states = {flag.state for flag in flags[before:]}
     assert states == {FaultFlag.STATE_LEARNING}, 'a sample a second was taken for silence'
-    assert peer.wait(lambda: flags[-1].state == FaultFlag.STATE_NOT_MONITORING, 3.0 + 1.0)
+    assert peer.wait(lambda: flags[-1].state == FaultFlag.STATE_NOT_MONITORING)
 
 
 def test_the_policy_of_a_fleet_allows_all_that_its_nodes_make(processes, peer):

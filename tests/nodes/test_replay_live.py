@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import rclpy
+from conftest import promised
 from damadics_bringup.processes import Processes, free_domain, parameters, surroundings
 from damadics_fd.bag import read_columns, write_columns
 from damadics_fd.commands.replay.live import Player
@@ -180,4 +181,4 @@ def wait_for_end(processes: Processes, name: str, patience: float = 100.0) -> No
         assert time.monotonic() < deadline
         processes.check()
         time.sleep(0.1)
-    time.sleep(2.0)  # the last messages pass through the chain
+    time.sleep(min(promised(2.0), 20.0))  # the last messages pass through the chain

@@ -157,10 +157,14 @@ def test_a_crash_is_started_again_and_a_refusal_is_not(tmp_path, monkeypatch):
     tasks = [Task(f'ends_{code}', 'x', 'x', [str(code)]) for code in (1, 2)]
     with Processes(tmp_path / 'logs') as processes:
         keeper = Keeper(processes, tasks)
-        end = time.monotonic() + 4.0
-        while time.monotonic() < end:
+
+        def both() -> bool:
             keeper.look()
-            time.sleep(0.05)
+            again = processes.log('ends_1').read_text().count('wrong') >= 2
+            return again and 'ends_2' in keeper.refused
+
+        assert wait_for(both)
+        wait_for(lambda: keeper.look(), 1.0)  # what is refused stays so
     assert keeper.refused == {'ends_2'}
     assert processes.log('ends_2').read_text().count('wrong') == 1
     assert processes.log('ends_1').read_text().count('wrong') >= 2
