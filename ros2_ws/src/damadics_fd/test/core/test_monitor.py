@@ -213,6 +213,21 @@ def test_motion_in_one_direction_is_not_enough():
     assert later.detections == []
 
 
+@pytest.mark.parametrize('stairs', [False, True], ids=['sliding', 'sticking and slipping'])
+def test_learning_may_begin_with_motion_in_one_direction(stairs):
+    def motion(t):
+        x = 0.2 + 0.02 * np.minimum(t, 36.0)
+        if stairs:  # a jump of 0.04 s each half a second, a rest between
+            x = 0.2 + 0.01 * (np.floor(2 * t) + np.clip((2 * t) % 1.0 / 0.08, 0, 1))
+            x = np.minimum(x, 0.92)
+        return np.where(t < 36.0, x, 0.92 - 0.12 * (5.0 - np.abs((t - 36.0) % 10.0 - 5.0)))
+
+    columns = valve(150.0, noise=5e-4, motion=motion, friction=0.1)
+    result = run(columns, SETTINGS)
+    assert result.estimator.status == 'monitoring'
+    assert result.detections == []
+
+
 def test_disturbance_during_learning_only_delays_it():
     passing = valve(200.0, friction=lambda t: 0.011 * (1 + 4 * ((t > 40) & (t < 48))))
     result = run(passing, SETTINGS)

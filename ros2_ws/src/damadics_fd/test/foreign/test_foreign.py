@@ -46,6 +46,13 @@ def test_the_lag_of_the_pressure_is_found(lag):
     assert b.settings.stiffness == pytest.approx(build.stiffness, rel=0.03)
 
 
+def test_the_mass_of_the_stem_is_not_taken_for_a_lag():
+    build = kinds.random_valve(22, mass=15.0)  # does what a lag of 22 ms would
+    b = balance(build, 22)
+    assert b.settings.ps_lag == 0.0
+    assert b.friction == pytest.approx(build.dry * build.force, rel=0.05)
+
+
 @pytest.mark.parametrize('wrong', [{'plug_gain': 1.2}, {'plug_shape': 0.1}, {'plug_gain': 0.15}])
 def test_the_plug_force_is_found(wrong):
     build = kinds.random_valve(23, **wrong)

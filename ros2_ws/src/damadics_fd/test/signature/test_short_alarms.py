@@ -8,7 +8,13 @@ import math
 import numpy as np
 import pytest
 from damadics_fd.core.signature import state as st
-from damadics_fd.core.signature.own_alarm import material, own_level, persists
+from damadics_fd.core.signature.own_alarm import (
+    material,
+    own_level,
+    persists,
+    start_alarm,
+    weigh_absence,
+)
 from damadics_fd.core.signature.settings import SignatureSettings
 from damadics_fd.core.signature.signature import Signature
 from damadics_fd.core.signature.step import CHANGED, QUIET
@@ -82,6 +88,31 @@ def test_an_alarm_ends_and_the_signature_watches_again(learned):
     assert (signature.view().state, signature.view().cause) == (st.STATE_MONITOR, 'none')
     assert (s.own, own_level(s, c), persists(s, c)) == (0, 0, False)
     assert math.isnan(signature.view().value)
+
+
+def test_a_change_about_the_limit_goes_once_and_not_with_each_stroke(learned):
+    signature, _ = monitoring(learned, seed=13)
+    s, c = signature.state[0], signature.record[0]
+    start_alarm(s, c)
+    s.own, s.family, s.stage2, s.ne[:], s.block.age = 1, st.FAMILY_FRICTION, 1, 100.0, 1.0
+
+    def present(D: float, blocks: int) -> list[int]:
+        levels = []
+        for _ in range(blocks):
+            s.D[st.SET_ALARM] = s.D[st.SET_SLOW] = D
+            weigh_absence(s, c)
+            assert persists(s, c) == (own_level(s, c) == 1)
+            levels.append(own_level(s, c))
+        return levels
+
+    least = int(s.raised_by)
+    assert least >= 30
+    for _ in range(5):
+        assert present(0.7 * c.d_decide, least - 1) == [1] * (least - 1)
+        assert present(1.1 * c.d_decide, 1) == [1]
+    assert present(0.7 * c.d_decide, least)[-1] == 0
+    assert present(1.1 * c.d_decide, least) == [0] * least  # not as much as an alarm needs
+    assert present(1.1 * c.d_alarm, 1) == [1]
 
 
 def test_an_alarm_that_no_motion_confirms_is_called_unconfirmed(learned):

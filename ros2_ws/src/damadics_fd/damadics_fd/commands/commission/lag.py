@@ -5,7 +5,8 @@ Lag of the chamber-pressure transmitter, and which way air and flow push, from s
 
 A stroke is fitted as the output of the lag: the force balance of every block since the stem
 began to move, through a first-order lag, whose first value is free. A stem at one speed cannot
-tell a lag T from a viscous friction of -K T; the changes of speed within strokes can.
+tell a lag T from a viscous friction of -K T; the changes of speed within strokes can. The mass of
+the stem does then what a lag of sqrt(2 m / K), 10 ms, would do, so that it has its column.
 """
 
 from collections.abc import Callable
@@ -26,12 +27,13 @@ SHORTEST, LONGEST = 5, 120  # blocks of a stroke that are used
 STRIBECK = 0.026  # strokes/s, as in the signature
 LEAST_GAIN = 16.0  # in chi-square, for which a lag is believed
 SIGN_GAIN = 9.0  # and a direction
-LEAST_LAG = 0.008  # s
+LEAST_LAG = 0.01  # s; what a model of blocks cannot tell from none
 CALM = 9  # blocks over which P1 - P2 is averaged: its noise must not call for a lag
 UNSURE = 0.1  # share of the correction for sensor noise that may be wrong
-STATED = 0.3  # share to which a stated viscous friction is known
+STATED = 0.3  # share to which a stated viscous friction, or the mass, is known
 LEAST_STD = 2e-3  # s; what blocks and model leave open
-FREE, NODES = 6, 11  # columns besides the plug force; nodes of its table
+FREE, NODES = 7, 11  # columns besides the plug force; nodes of its table
+INERTIA = 6
 SIGNED = (0, 2, 3)  # stiffness, viscous and dry friction push against the air
 SURE = 0.045  # strokes/s well above which nothing sticks any more
 STICKY = 0.5  # as doubtful as a block that slow
@@ -138,7 +140,7 @@ class _Scan:
     """Strokes laid out side by side, to be fitted for one lag after the other."""
 
     def __init__(self, b: Blocks, s: Settings, runs: list[slice], viscous: float | None) -> None:
-        self.viscous = viscous
+        self.known = {INERTIA: s.mass} | ({2: viscous} if viscous is not None else {})
         gain = plug_per_pascal(s, b.x)
         v = np.nan_to_num(b.v)
         dp = np.convolve(np.pad(b.dp, CALM // 2, 'edge'), np.full(CALM, 1.0 / CALM), 'valid')
@@ -149,9 +151,10 @@ class _Scan:
             np.sign(v),
             np.sign(v) * np.exp(-((v / STRIBECK) ** 2)),
             gain * b.rate_dp,
+            s.stroke * _acceleration(b),
         ]
         scale = float(np.ptp(s.area * b.ps)) + 1.0
-        self.precision = np.diag(1.0 / np.array([np.inf] * 4 + [0.01 * scale, 0.2]) ** 2)
+        self.precision = np.diag(1.0 / np.array([np.inf] * 4 + [0.01 * scale, 0.2, np.inf]) ** 2)
         self.plugged = s.plug_diameter > 0.0 and float(np.mean(np.abs(b.dp))) > 0.0
         if self.plugged:
             hats = np.clip(1.0 - np.abs(b.x * 10.0 - np.arange(NODES)[:, None]), 0.0, 1.0)
@@ -214,12 +217,11 @@ class _Scan:
         A, b = H / noise + self.precision, g / noise
         A += np.diag(1e-12 * np.diag(A))
         least = 0.0
-        if self.viscous is not None:
-            known = 1.0 / (STATED * max(self.viscous, 1.0)) ** 2
-            A[2, 2] += known
-            b = b.copy()
-            b[2] += known * air * self.viscous
-            least = known * self.viscous**2
+        for i, stated in self.known.items():
+            known = 1.0 / (STATED * max(stated, 0.1)) ** 2
+            A[i, i] += known
+            b[i] += known * air * stated
+            least += known * stated**2
         free = np.ones(len(g), bool)
         theta = np.zeros(len(g))
         for _ in range(len(SIGNED) + 1):
@@ -249,6 +251,14 @@ def _sensor_noise(b: Blocks, s: Settings, runs: list[slice], gain: Floats) -> fl
     force = np.concatenate([s.area * b.ps[run] for run in runs])
     slope = float(np.polyfit(moved, force, 1)[0])
     return float((slope * x) ** 2 + plug**2 / CALM)
+
+
+def _acceleration(b: Blocks) -> Floats:
+    """Return the acceleration [strokes/s2]; 0 where a neighbour is missing."""
+    found = np.zeros(len(b.x))
+    whole = b.index[2:] - b.index[:-2] == 2
+    found[1:-1] = np.where(whole, np.diff(b.x, 2), 0.0) / b.width**2
+    return found
 
 
 def _smoothing(width: float, T: float) -> float:

@@ -23,7 +23,7 @@ from damadics_fd.core.record import Floats
 from damadics_fd.core.settings import Settings
 
 CORRELATION = 0.1  # s; samples closer than this count as one
-FRESH = 200_000_000  # ns after its last motion in which the stem counts as moving
+FRESH = 50_000_000  # ns after its last motion in which the stem slides; later it may stick
 PRIOR = (0.05, 0.05, 0.02)  # standard deviations of offset, dK/K, friction
 SIGMA_MIN = 1e-3  # of K L: model error of the moving stem
 QUICK = 0.5  # s; mean over which a force that leaves the fit is judged
@@ -130,6 +130,19 @@ def invert(a: Floats) -> None:
 
 
 @jit
+def both_ways(s: State) -> bool:
+    """
+    Tell whether the first block holds enough motion in both directions to be compared with.
+
+    From motion in one direction a friction is as good an explanation as an offset.
+
+    :param s: state record.
+    :return: False where more blocks belong to the first one.
+    """
+    return bool(s.base[0] - abs(s.base[3]) >= ENOUGH)
+
+
+@jit
 def compare(s: State, c: Settings) -> None:
     """
     Set the distance of the block from the first one, and the change of the parameters.
@@ -156,25 +169,27 @@ def compare(s: State, c: Settings) -> None:
 @jit
 def close_block(s: State, c: Settings) -> bool:
     """
-    End a block: keep it as the first one or compare it; add it to the pool of all.
+    End a block with enough motion: add it to the first one or compare it, and pool all.
 
     :param s: state record: proven out, the bound that was learned on a valve that stayed the same.
     :param c: settings record.
     :return: False where the valve has changed.
     """
+    if s.block[0] < ENOUGH:
+        return True
     same = True
-    if s.block[0] >= ENOUGH:
-        if s.base[0] == 0.0:
-            s.base[:] = s.block
-            s.pool[:] = 0.0
-        else:
-            s.sigma = fit(s.base, s.theta, s.cov)
-            compare(s, c)
-            same = s.distance <= c.settled_max
-            s.proven = network.bound(s, 0.0)
+    if not both_ways(s):
+        s.base[:] += s.block
+        s.pool[:] = s.base
+    else:
+        s.sigma = fit(s.base, s.theta, s.cov)
+        compare(s, c)
+        same = s.distance <= c.settled_max
+        s.proven = network.bound(s, 0.0)
         if same:
             s.pool[:] += s.block
-            s.sigma = fit(s.pool, s.theta, s.cov)
+    if same:
+        s.sigma = fit(s.pool, s.theta, s.cov)
     s.block[:] = 0.0
     return same
 
@@ -187,7 +202,7 @@ def unlike(s: State) -> bool:
     :param s: state record with the fit of all blocks.
     :return: True where spring or its origin are far off, or the balance leaves more than friction.
     """
-    if s.base[0] == 0.0:
+    if not both_ways(s):
         return False
     far = abs(s.theta[1]) > FAR or abs(s.theta[0]) > FAR
     return bool(far or s.sigma > max(LEFT_OVER * abs(s.theta[2]), LEAST_LEFT))
@@ -247,7 +262,7 @@ def strays(s: State, c: Settings, dt: float, x1: float, left: float) -> bool:
     :param left: u - x1 - (alpha1/alpha5) x2 [1].
     :return: True where it has.
     """
-    if s.base[0] == 0.0:
+    if not both_ways(s):
         return False
     d = s.direction
     error = left - s.theta[0] - s.theta[1] * x1 - s.theta[2] * d

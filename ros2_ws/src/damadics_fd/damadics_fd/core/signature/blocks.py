@@ -118,13 +118,13 @@ def add_sample(
     raw = x
     if c.ps_lag > 0.0:
         raw = undelayed(s, c, offset, x)
+        s.sr += raw
     s.n += 1
     s.sx += x
     s.sp += pb
     s.su += c.weight / c.force_scale + pb - dp * plug_gain(c, x)
     s.sg += dp
     s.st += offset
-    s.sr += raw
     s.srr += raw * raw
     s.srt += raw * within
     s.stt += within * within

@@ -58,6 +58,7 @@ def watch(s: State, c: SignatureSettings) -> None:
         if s.over[m] >= c.n_alarm and s.state == STATE_MONITOR and own_alarm_ready(s, c):
             s.own = 1
             s.own_t = s.t
+            s.raised_by = max(c.memory[m], c.memory[SET_ALARM])
 
 
 @jit
@@ -74,15 +75,20 @@ def own_alarm_ready(s: State, c: SignatureSettings) -> bool:
 
 
 @jit
-def start_alarm(s: State) -> None:
+def start_alarm(s: State, c: SignatureSettings) -> None:
     """
     Begin to collect evidence on an alarm.
 
     :param s: state record.
+    :param c: settings record.
     """
     enter(s, STATE_ALARM, s.t)
     s.alarm_t = s.t
     s.n_alarm = 0.0
+    s.without = 0.0
+    s.gone = 0
+    if s.own == 0:
+        s.raised_by = c.memory[SET_ALARM]
     begin_judgement(s)
     restart_cues(s, s.t)
     clear_set(s, SET_ALARM)
@@ -96,7 +102,7 @@ def start_supply_alarm(s: State, c: SignatureSettings) -> None:
     :param s: state record.
     :param c: settings record.
     """
-    start_alarm(s)
+    start_alarm(s, c)
     s.own = 1
     s.own_t = s.t
     name_supply(s, supply_change(s, c))
@@ -131,6 +137,27 @@ def count_block(s: State) -> None:
 
 
 @jit
+def weigh_absence(s: State, c: SignatureSettings) -> None:
+    """
+    Count how long a moving block has not shown the change: it goes as slowly as it came.
+
+    :param s: state record after `decide`: without, gone in and out.
+    :param c: settings record.
+    """
+    seen = max(s.D[SET_ALARM], s.D[SET_SLOW])
+    if s.gone != 0:
+        if seen > c.d_alarm:
+            s.gone = 0
+            s.without = 0.0
+        return
+    early = s.ne[SET_ALARM] < FULL_EVIDENCE or s.stage2 == 0 or s.ne[SET_SLOW] < STAGE2_EVIDENCE
+    # a slow change may hover about the limit on the short record, and is plain on the long one
+    s.without = 0.0 if early or seen > c.d_decide else s.without + s.block.age
+    if s.without >= s.raised_by:
+        s.gone = 1
+
+
+@jit
 def shift_alarm(s: OwnAlarm, shift: int) -> None:
     """
     Follow a clock that was set back.
@@ -155,10 +182,7 @@ def own_level(s: State, c: SignatureSettings) -> int:
         return 0
     if s.cause == CAUSE_SUPPLY:
         return 1 if supply_lost(s, c) else 0
-    if s.ne[SET_ALARM] < FULL_EVIDENCE or s.stage2 == 0 or s.ne[SET_SLOW] < STAGE2_EVIDENCE:
-        return 1
-    # a slow change may hover about the limit on the short record, and is plain on the long one
-    return 1 if max(s.D[SET_ALARM], s.D[SET_SLOW]) > c.d_decide else 0
+    return 1 if s.gone == 0 else 0
 
 
 @jit
@@ -174,7 +198,7 @@ def persists(s: State, c: SignatureSettings) -> bool:
         return False
     if s.cause == CAUSE_SUPPLY:
         return supply_lost(s, c)
-    present: bool = max(s.D[SET_ALARM], s.D[SET_SLOW]) > c.d_decide
+    present: bool = s.gone == 0
     return present
 
 

@@ -66,7 +66,7 @@ def roughness(s: Blocks, c: SignatureSettings) -> float:
     :param c: settings record.
     :return: variance of the position about its line, noise included.
     """
-    x = s.sr / s.n
+    x = (s.sr if c.ps_lag > 0.0 else s.sx) / s.n
     t = s.st / s.n - s.index * c.block
     spread = s.stt / s.n - t * t
     both = s.srt / s.n - x * t

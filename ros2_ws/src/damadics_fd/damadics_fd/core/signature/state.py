@@ -208,6 +208,9 @@ class OwnAlarm(Record):
     own_t: int  # [ns] it began
     alarm_t: int  # [ns] the present alarm began, whoever raised it
     n_alarm: float  # weight of the moving blocks since
+    raised_by: float  # moving blocks whose evidence raised it
+    without: float  # moving blocks without evidence in a row
+    gone: int  # 1 after as many of those as had raised it
 
 
 class Cause(Record):

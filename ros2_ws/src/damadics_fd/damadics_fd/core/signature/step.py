@@ -31,6 +31,7 @@ from damadics_fd.core.signature.own_alarm import (
     start_alarm,
     start_supply_alarm,
     watch,
+    weigh_absence,
 )
 from damadics_fd.core.signature.phase import count_moving, enter, shift_phase
 from damadics_fd.core.signature.reference import (
@@ -130,7 +131,7 @@ def take_alarm(s: State, c: SignatureSettings) -> int:
         interrupt(s)
         start_learning(s, c)  # what has been seen may be the fault
     elif s.alarm_in != 0 and s.state != STATE_ALARM:
-        start_alarm(s)
+        start_alarm(s, c)
     elif s.alarm_in == 0 and s.state == STATE_ALARM:
         end_alarm(s)
     return CHANGED
@@ -178,10 +179,11 @@ def judge(s: State, c: SignatureSettings) -> int:
         if s.state == STATE_ALARM:
             check_passivity(s, c)
         news = s.state == STATE_ALARM and s.block.standing != 0 and stick_evidence(s) > 0.0
-        if s.block.moving != 0 and fresh:
-            news = monitor_block(s, c)
-        if news:
+        told = s.block.moving != 0 and fresh and monitor_block(s, c)
+        if news or told:
             decide(s, c)
+        if told:
+            weigh_absence(s, c)
         if s.state == STATE_VERIFY:
             finish_verification(s, c)
         elif (
@@ -232,7 +234,7 @@ def monitor_block(s: State, c: SignatureSettings) -> bool:
         learn_block(s)
     watch(s, c)
     if s.own != 0:
-        start_alarm(s)
+        start_alarm(s, c)
     elif s.state == STATE_MONITOR and max(s.D[0], max(s.D[1], s.D[2])) < D_VERIFY:
         refine_unit(s, c)
     return False
