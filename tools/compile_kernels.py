@@ -59,6 +59,13 @@ def bank(mode: str) -> None:
     Bank([Settings.for_mode(mode)]).take(np.array([0]), np.array([1]), row)
 
 
+def pair() -> None:
+    """Compile the call for one sample that estimator and detector of one process share."""
+    from damadics_fd.core.bank.pair import warm_up
+
+    warm_up()
+
+
 def lugre() -> None:
     """Compile the second model of the plant."""
     from damadics_plant import simulate
@@ -94,7 +101,13 @@ Task = tuple[Callable[..., None], tuple[str, ...]]
 STAGES: dict[str, list[list[Task]]] = {  # the tasks of an inner list go on at the same time
     'demo': [[(imports, EXECUTABLES)], [(detector, ()), (the_others, ())], [(pipeline, ())]],
     'more': [
-        [(bank, ('paper',)), (bank, ('scada',)), (lugre, ()), (imports, MORE_EXECUTABLES)],
+        [
+            (bank, ('paper',)),
+            (bank, ('scada',)),
+            (pair, ()),
+            (lugre, ()),
+            (imports, MORE_EXECUTABLES),
+        ],
     ],
 }
 

@@ -11,6 +11,7 @@ from damadics_msgs.msg import FaultEvent, FaultFlag, Float64Stamped, Isolation
 
 from damadics_fd.causes import explain
 from damadics_fd.core.approximator.state import Estimate
+from damadics_fd.core.bank.pair import HAPPENED, SHOWN, SIGNED
 from damadics_fd.core.decision.detector import Detector, Outcome
 from damadics_fd.core.decision.events import Decision, Event
 from damadics_fd.core.judgement import Judgement, LiveJudgement
@@ -102,9 +103,9 @@ class DetectorNode(MonitoringNode):
         """Begin afresh, with the alarms from before where they are kept."""
         made = self.entities
         self._core.reset()
-        self._decision: Decision | None = None
+        self._decision = None
         self._judged = self._twice = 0
-        self._phase = PHASE_INIT
+        self.phase, self.last = PHASE_INIT, -1
         self._was_silent = True
         self._live = LiveJudgement(self._core)
         self._tag = ''
@@ -148,7 +149,8 @@ class DetectorNode(MonitoringNode):
         """Take estimates of an estimator in this process directly; errors as from a topic."""
         take = self.entities.contained('estimate', heard)
         hear = self.entities.contained('isolation', self._hear)
-        self._taker = Taker(take, hear)
+        judged = self.entities.contained('estimate', self._judged_beside)
+        self._taker = Taker(take, hear, self, judged)
         takers = self._joints.at(self.resolve_topic_name('estimate')).takers
         takers.append(self._taker)
         self.entities.on_release(lambda: takers.remove(self._taker))
@@ -181,11 +183,15 @@ class DetectorNode(MonitoringNode):
         return self.get_namespace().strip('/').replace('/', '__') or 'root'
 
     def _take(self, estimate: Estimate, tag: str) -> None:
-        decision = self._judge(estimate)
-        if decision is not None:
-            self._publish(decision, tag)
-            self._keep(decision, tag)
-            self._strokes.follow(estimate, tag)
+        before, decision = self._decision, self._judge(estimate)
+        if decision is None:
+            return
+        self._decision = decision
+        self._publish(tag, before is None or decision.shown != before.shown)
+        if decision.transitions:
+            self._happened(tag)
+        self._signature.update(decision.stamp, tag)
+        self._strokes.follow(estimate, tag)
 
     def _judge(self, estimate: Estimate) -> Decision | None:
         """Judge an estimate; None where it is not to be judged."""
@@ -197,33 +203,62 @@ class DetectorNode(MonitoringNode):
         if self._judged and before and estimate.stamp == before.stamp:
             self._twice += 1  # two estimators send
             return None
-        learns = self._phase == PHASE_MONITOR and estimate.phase < PHASE_MONITOR
+        learns = self.phase == PHASE_MONITOR and estimate.phase < PHASE_MONITOR
         if learns and not self._was_silent:
             self._core.signature.relearn()  # somebody had the valve learned afresh
-        self._phase = estimate.phase
+        self.phase, self.last = estimate.phase, estimate.stamp
         self._judged += 1
         return self._core.update(estimate)
 
-    def _publish(self, decision: Decision, tag: str) -> None:
+    def _judged_beside(self, stamp: int, tag: str, news: int) -> None:
+        """Publish what an estimator of this process has had judged, an ordinary estimate."""
+        self.watch.heard_beside(self._taker.watch)
+        self._judged += 1
+        self.last, self._unread = stamp, True
+        if tag != self._tag:
+            self._strokes.follow(self._core.estimate, tag)
+        self._publish(tag, bool(news & SHOWN))
+        if news & HAPPENED:
+            self._happened(tag)
+        if news & SIGNED or self._signature.due(stamp):
+            self._signature.update(stamp, tag)
+        if self._strokes.under_way:
+            self._strokes.follow(self._core.estimate, tag)
+
+    @property
+    def core(self) -> Detector:
+        """The detector of this node."""
+        return self._core
+
+    @property
+    def _decision(self) -> Decision | None:
+        """The latest decision; it is read where it is needed."""
+        if self._unread:
+            self._decision = self._core.decision
+        return self._known
+
+    @_decision.setter
+    def _decision(self, decision: Decision | None) -> None:
+        self._known, self._unread = decision, False
+
+    def _publish(self, tag: str, changed: bool) -> None:
         """Publish residual and threshold to who listens, and the flag where it has changed."""
-        before, self._decision = self._decision, decision
         if self._tag != tag:
             self._tag = self._flag.header.frame_id = tag
-        if self._residual_heard():
+        if self._residual_heard() and (decision := self._decision):
             self._residual.publish(self._encode(decision.stamp, tag, decision.residual))
-        if self._threshold_heard():
+        if self._threshold_heard() and (decision := self._decision):
             self._threshold.publish(self._encode(decision.stamp, tag, decision.threshold))
         turned = self._was_silent and self._look()
-        if not turned and (before is None or decision.shown != before.shown):
+        if changed and not turned:
             self._publish_flag()
             self.diagnostics.check()
 
-    def _keep(self, decision: Decision, tag: str) -> None:
-        """Tell transitions, and keep alarm and signature for a restart."""
-        if decision.transitions:
+    def _happened(self, tag: str) -> None:
+        """Tell the transitions of the latest decision, and keep the alarm for a restart."""
+        if decision := self._decision:
             self._tell(self._live.tell(decision.events), tag)
             self._decision = self._core.decision
-        self._signature.update(decision.stamp, tag)
 
     def _tell(self, events: Iterable[Event], frame_id: str, more: str = '') -> None:
         for event in events:

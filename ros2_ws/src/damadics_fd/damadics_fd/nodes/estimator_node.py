@@ -11,7 +11,9 @@ from damadics_msgs.msg import Estimate as EstimateMessage
 from damadics_msgs.msg import Isolation, Measurement, OperatorAction
 from damadics_msgs.srv import Relearn
 
+from damadics_fd.core.approximator.estimator import Estimator
 from damadics_fd.core.approximator.state import Estimate
+from damadics_fd.core.bank.pair import ESTIMATED, REFUSED, Pair
 from damadics_fd.core.decision.alarm import (
     FAILURE,
     FUNCTION_CHECK,
@@ -24,7 +26,7 @@ from damadics_fd.core.judgement import Judgement
 from damadics_fd.core.quality import Reason, Refused
 from damadics_fd.core.sample import Sample
 from damadics_fd.nodes.frozen_position import FrozenPosition
-from damadics_fd.nodes.joint import Joints
+from damadics_fd.nodes.joint import Beside, Joints, Taker
 from damadics_fd.nodes.managed import MonitoringNode
 from damadics_fd.nodes.operator import OperatorActions
 from damadics_fd.nodes.reference_keeper import ReferenceKeeper
@@ -79,7 +81,7 @@ class EstimatorNode(MonitoringNode):
         self._core.reset()
         self._encoder = EstimateEncoder()
         self._joint = self._joints.at(self.resolve_topic_name('estimate'))
-        self._progress = 0.0
+        self._pair: tuple[Taker, Pair] | None = None
         self._last, self._phase = self._core.phase, -1
         self._refused_at = -math.inf  # monotonic time of the last refused sample [s]
         self._frozen = FrozenPosition()
@@ -101,12 +103,17 @@ class EstimatorNode(MonitoringNode):
         if not self.active:
             return
         self._frozen.note(sample.stamp, sample.cv, sample.x1)
-        estimate = self._core.update(*sample)
+        taker = self._joint.only
+        if taker is not None and taker.beside is not None and taker.beside.active:
+            estimate = self._judged_at_once(sample, tag, taker, taker.beside)
+            if estimate is None:
+                return
+        else:
+            estimate = self._core.update(*sample)
         if isinstance(estimate, Refused):
             self._refused_at = time.monotonic()
             self.diagnostics.check()
             return
-        self._progress = estimate.progress
         self._tell_judgement(tag)  # first, for the alarm that the estimate may raise
         self._give(estimate, tag)
         if estimate.phase == self._phase:
@@ -118,6 +125,28 @@ class EstimatorNode(MonitoringNode):
             self.diagnostics.check()
             if learned:
                 self._reference.keep()
+
+    def _judged_at_once(
+        self, sample: Sample, tag: str, taker: Taker, beside: Beside
+    ) -> Estimate | Refused | None:
+        """Let the only detector judge what is ordinary with the sample; None where it was."""
+        core = self._core
+        if not isinstance(core, Estimator):
+            return core.update(*sample)
+        if self._pair is None or self._pair[0] is not taker:
+            self._pair = taker, Pair(core, beside.core)
+            taker.watch = self.watch
+        phase = self._phase if self._phase == beside.phase else -1
+        news = self._pair[1].take(sample, phase, beside.last)
+        if news >= 0:
+            if self._heard() > 1:
+                taker.sent(sample.stamp)
+                self._publisher.publish(self._encoder.encode(core.latest, tag))
+            taker.judged(sample.stamp, tag, news)
+            return None
+        if news == ESTIMATED:
+            return core.latest
+        return core.note(REFUSED - news, sample.stamp, sample[1:], core.last_stamp)
 
     def _give(self, estimate: Estimate, tag: str) -> None:
         """Hand an estimate to the detector beside, and publish it for whoever else listens."""
@@ -161,7 +190,8 @@ class EstimatorNode(MonitoringNode):
         values = {
             'NE 107': self._class_of(failing, good),
             'Phase': self._core.phase,
-            'Learning progress (%)': 100.0 * self._progress,
+            'Learning progress (%)': 100.0
+            * (self._core.progress if counters['accepted'] else 0.0),
             'Last refused': self._core.last_rejection or 'none',
             **{f'Samples {name.replace("_", " ")}': count for name, count in counters.items()},
         }

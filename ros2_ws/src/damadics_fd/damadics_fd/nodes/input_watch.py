@@ -70,7 +70,7 @@ class InputWatch:
         self._ros = 0  # ROS time of the last message [ns]
         self._ros_seen = 0
         self._ros_moved = 0.0  # monotonic time of the last motion of ROS time [s]
-        self._fresh = Freshness(self._simulated)
+        self._fresh = self._own = Freshness(self._simulated)
         self._far: Callable[[], int] = lambda: 0  # messages whose stamp alone ran far ahead
         self._tag = ''  # that came last
         self._lost = 0
@@ -97,10 +97,11 @@ class InputWatch:
         """
         jumps: ForwardJumps[S] = ForwardJumps()
         self._far = lambda: jumps.refused
-        fresh = self._fresh.heard
+        fresh = self._own.heard
 
         def heard(item: S, tag: str) -> None:
             self._wall = now = time.monotonic()
+            self._fresh = self._own
             if self._simulated:
                 self._ros = self._clock.now().nanoseconds
             if tag != self._tag:
@@ -115,6 +116,7 @@ class InputWatch:
                 self._ros = self._clock.now().nanoseconds
             if tag != self._tag:
                 self._tag = plain(tag, NAME)
+            self._fresh = self._own
             fresh(item.stamp, now)
             take(item, self._tag)
 
@@ -128,6 +130,14 @@ class InputWatch:
         )
         self._entities.subscription(kind, self._topic, arrived, profile, events, raw=True)
         return handed
+
+    def heard_beside(self, other: 'InputWatch') -> None:
+        """
+        Note that what this watch waits for was made of what another one in the process heard.
+
+        :param other: it has just heard it.
+        """
+        self._wall, self._ros, self._fresh = other._wall, other._ros, other._fresh
 
     @property
     def age(self) -> float:

@@ -8,12 +8,27 @@ Over DDS this hop costs more than everything else that a sample needs.
 
 from collections import deque
 from collections.abc import Callable
+from typing import Protocol
 
 from damadics_fd.core.approximator.state import Estimate
+from damadics_fd.core.decision.detector import Detector
 from damadics_fd.core.judgement import Judgement
+from damadics_fd.nodes.input_watch import InputWatch
 from damadics_fd.ros.process.rounds import Rounds
 
 MOST_ECHOES = 100_000  # as many as the queue of samples holds
+
+
+class Beside(Protocol):
+    """A detector of which an estimator beside it may judge the ordinary estimates."""
+
+    active: bool
+    last: int  # stamp of its latest decision [ns]; -1 where there is none
+    phase: int  # of the latest estimate
+
+    @property
+    def core(self) -> Detector:
+        """The detector itself."""
 
 
 class Taker:
@@ -22,14 +37,20 @@ class Taker:
 
     :param take: called with each estimate and its tag.
     :param hear: called with each judgement, where the mode has any.
+    :param beside: the detector, where its estimates may be judged with the samples.
+    :param judged: called after that, with stamp, tag and the bits of `Pair.take`.
     """
+
+    watch: InputWatch  # of the estimator beside
 
     def __init__(
         self,
         take: Callable[[Estimate, str], None],
         hear: Callable[[Judgement], None] = lambda judgement: None,
+        beside: Beside | None = None,
+        judged: Callable[[int, str, int], None] = lambda stamp, tag, news: None,
     ) -> None:
-        self.take, self.hear = take, hear
+        self.take, self.hear, self.beside, self.judged = take, hear, beside, judged
         self._echoes: deque[int] = deque(maxlen=MOST_ECHOES)
 
     def sent(self, stamp: int) -> None:
@@ -59,6 +80,11 @@ class Joint:
 
     def __init__(self) -> None:
         self.takers: list[Taker] = []
+
+    @property
+    def only(self) -> Taker | None:
+        """The detector, where there is one."""
+        return self.takers[0] if len(self.takers) == 1 else None
 
     def hand(self, estimate: Estimate, tag: str) -> None:
         """

@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable
 from functools import partial
 
+from damadics_fd.core.bank.pair import warm_up
 from damadics_fd.nodes.detector_node import DetectorNode
 from damadics_fd.nodes.estimator_node import EstimatorNode
 from damadics_fd.nodes.joint import Joints
@@ -77,6 +78,7 @@ def main(args: list[str] | None = None) -> int:
         p.error(problem)
     # The process takes its enclave and log level from all words, the nodes theirs from their own.
     joints = Joints()
+    warm_up()
     return spin_all([partial(NODES[name], own, joints) for name, *own in groups], words)
 
 

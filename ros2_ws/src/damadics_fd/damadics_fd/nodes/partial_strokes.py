@@ -70,7 +70,7 @@ class PartialStrokes:
         self._core = core
         self._limits = limits
         self._blind = blind
-        self._estimate: Estimate | None = None
+        self._judged = False
         self._strokes: Strokes | None = None
         self._message, self._tag = StrokeRequest(), ''
         self._publisher = entities.publisher(StrokeRequest, 'stroke_request', qos.COMMANDS)
@@ -84,7 +84,7 @@ class PartialStrokes:
         :param estimate: the newest.
         :param frame_id: tag of the actuator.
         """
-        self._estimate, self._tag = estimate, frame_id
+        self._judged, self._tag = True, frame_id
         strokes = self._strokes
         if strokes is None:
             return
@@ -100,6 +100,16 @@ class PartialStrokes:
         elif (estimate.stamp - strokes.began) * 1e-9 > PATIENCE * strokes.count:
             made = strokes.halves // 2
             self.end(f'the driver made {made} of {strokes.count} in time')
+
+    @property
+    def under_way(self) -> bool:
+        """Whether strokes are being made: each estimate is then to be followed."""
+        return self._strokes is not None
+
+    @property
+    def _estimate(self) -> Estimate | None:
+        """The estimate that was judged last."""
+        return self._core.estimate if self._judged else None
 
     def end(self, cause: str) -> None:
         """

@@ -134,6 +134,15 @@ class SignaturePublisher:
             **{f'Trend of {o.quantity}': o.sentence() for o in self._outlook},
         }
 
+    def due(self, stamp: int) -> bool:
+        """
+        Tell whether a second is over since the last message.
+
+        :param stamp: of the measurement [ns].
+        :return: True where `update` would publish without news.
+        """
+        return not self._next - PERIOD <= stamp < self._next
+
     def update(self, stamp: int, tag: str) -> None:
         """
         Publish where there is news or a second is over.
@@ -145,7 +154,7 @@ class SignaturePublisher:
         if state is not self._state:  # views of its fields: a record is slow to ask
             self._state, self._news = state, [state[name] for name in ('state', 'family', 'cause')]
         present = [int(field.item()) for field in self._news]
-        if present == self._last and self._next - PERIOD <= stamp < self._next:
+        if present == self._last and not self.due(stamp):
             return
         s = state[0]
         self._last, self._next = present, stamp + PERIOD

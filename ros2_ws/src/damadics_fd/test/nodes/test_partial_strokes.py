@@ -16,7 +16,7 @@ class Bench:
     def __init__(self, allowed=True, drivers=1):
         self.sent, self.told, self.undo = [], [], []
         self.alarm = SimpleNamespace(active=False, latched=False)
-        core = SimpleNamespace(state=[self.alarm])
+        self.core = core = SimpleNamespace(state=[self.alarm])
         self.blind = False
         publisher = SimpleNamespace(
             publish=lambda m: self.sent.append((m.request, m.amplitude, m.count)),
@@ -34,7 +34,8 @@ class Bench:
 
     def see(self, x1=0.5, at=0.0):
         values = dict.fromkeys(Estimate.names(), 0.0)
-        self.strokes.follow(Estimate(**{**values, 'stamp': int(at * 1e9), 'x1': x1}), 'LV-1')
+        self.core.estimate = Estimate(**{**values, 'stamp': int(at * 1e9), 'x1': x1})
+        self.strokes.follow(self.core.estimate, 'LV-1')
 
     def ask(self, amplitude=0.05, count=2):
         request = PartialStroke.Request(amplitude=amplitude, count=count, user='Anna')

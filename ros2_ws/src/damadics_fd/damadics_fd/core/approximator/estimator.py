@@ -49,16 +49,28 @@ class Estimator(Intake):
         self._estimate = Estimate.rows()
         self.reset()
 
-    def hold(self, quality: Array, state: Array) -> Self:
+    def hold(self, quality: Array, state: Array, estimate: Array | None = None) -> Self:
         """
         Go on with a state that is kept elsewhere, in place.
 
         :param quality: of the input, an array of length 1 like the following.
         :param state: of the estimator.
+        :param estimate: the latest one; None: as before.
         :return: this estimator.
         """
         self.quality, self.state = quality, state
+        self._estimate = self._estimate if estimate is None else estimate
         return self
+
+    @property
+    def arrays(self) -> tuple[Array, Array, Array, Array]:
+        """Return what it works on: quality, state, settings and estimate, of length 1."""
+        return self.quality, self.state, self._settings, self._estimate
+
+    @property
+    def latest(self) -> Estimate:
+        """Return the latest estimate."""
+        return Estimate(*self._estimate.item())
 
     def reset(self) -> None:
         """Forget everything: what was learned, the filters and the counters."""
@@ -106,7 +118,7 @@ class Estimator(Intake):
         )
         if reason:
             return self.note(reason, stamp, (cv, x1, p1, p2, t1, flow, ps), self.last_stamp)
-        return Estimate(*self._estimate.item())
+        return self.latest
 
     def run(
         self,

@@ -65,6 +65,28 @@ class Detector:
         self.signature.state = signature
         return self
 
+    @property
+    def arrays(self) -> tuple[Array, Array, Array, Array, Array, Array]:
+        """
+        Return what it works on, of length 1.
+
+        :return: state, settings, state and settings of the signature, latest estimate, decision.
+        """
+        signature = self.signature
+        return (
+            self.state,
+            self._settings,
+            signature.state,
+            signature.record,
+            self._estimate,
+            self._decision,
+        )
+
+    @property
+    def estimate(self) -> Estimate:
+        """Return the estimate that was judged last."""
+        return Estimate(*self._estimate.item())
+
     def reset(self) -> None:
         """Forget everything, alarms too."""
         self.state[:] = State.rows()
