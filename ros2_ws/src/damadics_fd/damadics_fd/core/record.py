@@ -184,20 +184,21 @@ class Record:
 
 def _fitting(value: Plain, part: NDArray[np.generic], what: str) -> NDArray[np.generic]:
     """Return a plain value as the array that a field takes."""
-    said = f'{what} = {reprlib.repr(value)}'
     try:
         given = np.asarray(value)
     except ValueError as error:
-        raise ValueError(f'{said} does not fit: {error}') from error
+        raise ValueError(f'{what} = {reprlib.repr(value)} does not fit: {error}') from error
     shape, kind = np.shape(part), part.dtype.kind
     if given.shape != shape or given.dtype.kind not in SUITS[kind]:
         needed = {'f': 'numbers', 'i': 'whole numbers', 'b': 'true or false'}[kind]
-        raise ValueError(f'{said} does not fit: it takes {needed} of the shape {shape}')
+        raise ValueError(
+            f'{what} = {reprlib.repr(value)} does not fit: it takes {needed} of the shape {shape}'
+        )
     fitting = given.astype(part.dtype)
     if kind == 'f' and not np.isfinite(fitting).all():
-        raise ValueError(f'{said} is not finite')
+        raise ValueError(f'{what} = {reprlib.repr(value)} is not finite')
     if kind == 'i' and (fitting != given).any():
-        raise ValueError(f'{said} is too large')
+        raise ValueError(f'{what} = {reprlib.repr(value)} is too large')
     return fitting
 
 

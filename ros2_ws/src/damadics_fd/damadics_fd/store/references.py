@@ -10,6 +10,7 @@ or of other settings.
 import math
 import time
 from dataclasses import asdict, dataclass, field, fields
+from functools import cache, lru_cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -196,6 +197,16 @@ def _text(content: Saved, name: str) -> str:
     return value
 
 
+@lru_cache(256)  # a fleet has thousands of valves with equal settings
+def _plain(settings: Settings) -> Saved:
+    return settings.to_dict()
+
+
+@cache
+def _defaults(mode: str) -> Saved:
+    return Settings.for_mode(mode).to_dict()
+
+
 def _check(reference: Reference, actuator: str | None, settings: Settings, now: float) -> None:
     if actuator is not None and reference.actuator != actuator:
         raise ValueError(f'belongs to {reference.actuator}, not to {actuator}')
@@ -204,9 +215,9 @@ def _check(reference: Reference, actuator: str | None, settings: Settings, now: 
             f'was written {(reference.created - now) / 86400:.1f} days in the '
             'future: set the clock right'
         )
-    present = settings.to_dict()
+    present = _plain(settings)
     # a setting that is younger than the reference had its default then
-    learned = {**Settings.for_mode(settings.mode).to_dict(), **reference.settings}
+    learned = {**_defaults(settings.mode), **reference.settings}
     changed = [
         f'{name} = {present[name]} was {learned[name]}'
         for name in BINDING

@@ -4,11 +4,14 @@
 
 import json
 import math
+import os
+from pathlib import Path
 
 import numpy as np
 import pytest
 from damadics_fd.core.bank import Bank, ahead
 from damadics_fd.core.bank.approximators import Approximators
+from damadics_fd.core.bank.lazily import copies
 from damadics_fd.core.decision.events import Decision
 from damadics_fd.core.monitor import monitor_for
 from damadics_fd.core.quality import Reason
@@ -177,6 +180,40 @@ def test_what_was_learned_comes_and_goes_by_valve(case):
     bank.reset(0)
     assert bank.counters(0)['accepted'] == 0
     assert bank.tobytes(2) == untouched
+
+
+def test_valves_of_a_control_room_take_memory_where_something_is_written():
+    settings = [Settings.for_mode('scada', **SLOW)] * 400
+    chain = monitor_for(settings[0])
+    chain.run(controlled(1))
+    learned = chain.learned()
+    bank = Bank(settings)
+    bank.restore(0, learned)  # loads what is loaded once
+    before = resident()
+    for v in range(1, 400):
+        bank.restore(v, learned)
+    assert resident() - before < 399 * 20_000
+    columns = controlled(2)
+    one = {name: column[:3] for name, column in columns.items() if name != 'stamp'}
+    bank.take(np.zeros(3, np.int64), columns['stamp'][:3], one)
+    seen = bank.tobytes(0)
+    assert seen != bank.tobytes(1)
+    bank.restore(0, learned)
+    fresh = Bank(settings[:1])
+    fresh.restore(0, learned)
+    assert bank._held.states[:1].tobytes() == fresh._held.states[:1].tobytes()
+
+
+def resident():
+    """Return the resident memory of this process [B]."""
+    pages = int(Path('/proc/self/statm').read_text().split()[1])
+    return pages * os.sysconf('SC_PAGESIZE')
+
+
+def test_copies_are_those_that_numpy_makes():
+    first = monitor_for(Settings.for_mode('monitor')).detector.signature.state
+    assert copies(first, 5).tobytes() == np.repeat(first, 5).tobytes()
+    assert copies(first, 0).shape == (0,)
 
 
 def small(count=2):

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 import numpy as np
 
 from damadics_fd.core.bank.held import Held
+from damadics_fd.core.bank.lazily import copies
 from damadics_fd.core.bank.rows import LATER, Reasons, decide, note, take_control_room
 from damadics_fd.core.decision.events import Decision
 from damadics_fd.core.judgement import Judgement
@@ -19,6 +20,8 @@ from damadics_fd.core.scada.kernel import Shown
 from damadics_fd.core.scada.naming.looks import Looks
 from damadics_fd.core.scada.state import MONITOR, REFERENCE
 from damadics_fd.core.settings import Settings
+
+HEAD = MONITOR.fields['history'][1] if MONITOR.fields else 0  # [B]; the samples stand behind it
 
 
 class ControlRooms(Held):
@@ -36,10 +39,20 @@ class ControlRooms(Held):
         self.monitor_records = stacked(ScadaEstimator(one).monitor.record for one in self.settings)
         self.shown = Shown.rows(count)
         self.shown['phase'] = PHASE_INIT
-        self.states = np.zeros(count, MONITOR)
+        self.states = copies(BLANK, count)
         self.references = np.zeros(count, REFERENCE)
         self.learned = np.zeros(count, np.bool_)
         self.learning: dict[int, ScadaEstimator] = {}  # made with the first sample
+
+    def copies(self, first: Array, count: int) -> Array:
+        """
+        Return copies of the signature's record, which this mode does not use.
+
+        :param first: the record, in an array of length 1.
+        :param count: how many.
+        :return: structured array of that length.
+        """
+        return copies(first, count)
 
     def take(
         self, valve: Ints, stamp: Ints, signals: Sequence[Floats]
@@ -168,7 +181,9 @@ class ControlRooms(Held):
             self.learning[v] = estimator
             return
         self.references[v] = reference[0]
-        self.states[v] = estimator.monitor.states[0]
+        kept, given = self.states[v : v + 1], estimator.monitor.states
+        if _begun(kept) or _begun(given):  # else both are zero, and shall take no memory
+            kept[:] = given
 
     def state_arrays(self) -> list[Array]:
         """
@@ -202,3 +217,8 @@ class ControlRooms(Held):
         self.learned[v] = len(state) == records
         if not self.learned[v]:
             self._lend(v).monitor.restore_seen(state[records:])
+
+
+def _begun(state: Array) -> bool:
+    """Tell whether a monitor has seen anything; what it remembers of samples is not looked at."""
+    return bool(state.view(np.uint8)[:HEAD].any())

@@ -39,10 +39,20 @@ class Held:
         count = len(settings)
         self.quality = Quality.rows(count)
         self.detectors = np.repeat(firsts[0].state, count)
-        self.signatures = np.repeat(firsts[0].signature.state, count)
+        self.signatures = self.copies(firsts[0].signature.state, count)
         self.estimates = Estimate.rows(count)
         self.decisions = Decision.rows(count)
         self.refused = LastRefused.rows(count)
+
+    def copies(self, first: Array, count: int) -> Array:
+        """
+        Return copies of a record that every sample works on.
+
+        :param first: the record, in an array of length 1.
+        :param count: how many.
+        :return: structured array of that length.
+        """
+        return np.repeat(first, count)
 
     def of(self, v: int) -> Settings:
         """

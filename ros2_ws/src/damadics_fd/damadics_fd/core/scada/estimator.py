@@ -4,6 +4,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import cache, lru_cache
 from typing import Self
 
 import numpy as np
@@ -27,6 +28,7 @@ from damadics_fd.core.valve.parameters import Valve
 BLANK = np.zeros(1, MONITOR)
 
 
+@lru_cache(256)  # a fleet has thousands of valves with equal settings
 def scada_settings(settings: Settings, kv_stated: bool | None = None) -> ScadaSettings:
     """
     Return what the monitor of mode scada reads of all settings.
@@ -48,6 +50,11 @@ def scada_settings(settings: Settings, kv_stated: bool | None = None) -> ScadaSe
         kv_stated=kv_stated,
         actuator=settings.valve(),
     )
+
+
+@cache
+def _learned_names() -> frozenset[str]:
+    return frozenset(Reference.plain(Reference.rows()))
 
 
 class ScadaEstimator(Intake):
@@ -253,7 +260,7 @@ class ScadaEstimator(Intake):
         :param learned: what was learned.
         :raises ValueError: where it is not that; the monitor is then untouched.
         """
-        if learned.keys() != Reference.plain(Reference.rows()).keys():
+        if learned.keys() != _learned_names():
             raise ValueError(
                 'learned state: it is damaged or of another version of mode scada: learn anew, '
                 'live or by commission --mode scada RECORDING'

@@ -171,6 +171,7 @@ def members_of(valves: Sequence[Valve]) -> list[Member]:
 def _members(valves: Sequence[Valve], problems: list[str]) -> Iterator[Member]:
     known = {row['name'] for row in Settings.describe()}
     files: dict[Path, Saved] = {}
+    made: dict[str, Settings] = {}  # thousands of valves may have equal ones
     for valve in valves:
         try:
             given: Saved = {}
@@ -185,7 +186,10 @@ def _members(valves: Sequence[Valve], problems: list[str]) -> Iterator[Member]:
             unknown = sorted(set(values) - known)
             if unknown:
                 raise SettingsError([f'there is no setting {", ".join(unknown)}'])
-            settings = Settings.from_mapping(values)
+            key = repr(sorted(values.items()))
+            if key not in made:
+                made[key] = Settings.from_mapping(values)
+            settings = made[key]
         except (SettingsError, OSError, yaml.YAMLError) as problem:
             problems.append(f'{valve.name}: {problem}')
             continue
