@@ -55,6 +55,28 @@ def test_other_cores_that_load_ahead_change_nothing(tmp_path, monkeypatch, threa
     assert (found['strength'] == kept).all()
 
 
+def test_memory_of_a_closed_file_serves_the_next(tmp_path, monkeypatch):
+    monkeypatch.setattr(loading, '_spare', [])
+    write_columns(tmp_path / 'a.mcap', simulated(60_000))
+    other = simulated(60_000)
+    write_columns(tmp_path / 'b.mcap', other | {name: other[name] + 1.0 for name in SIGNALS})
+    with McapFile(tmp_path / 'a.mcap') as mcap:
+        for _, chunk in mcap.chunks():
+            last, content = chunk, chunk.tobytes()
+    kept = list(loading._spare)
+    assert 0 < len(kept) <= loading.AHEAD
+    with McapFile(tmp_path / 'b.mcap') as mcap:
+        first = [chunk.tobytes() for _, chunk in mcap.chunks()]
+    assert last.tobytes() == content, 'the last chunk of a closed file may still be looked at'
+    monkeypatch.setattr(loading, '_spare', [])
+    with McapFile(tmp_path / 'b.mcap') as mcap:
+        assert first == [chunk.tobytes() for _, chunk in mcap.chunks()]
+    monkeypatch.setattr(loading, '_spare', [])
+    monkeypatch.setattr(loading, 'KEPT', 1000)
+    read_columns(tmp_path / 'a.mcap')
+    assert loading._spare == []
+
+
 def test_a_channel_that_appears_later_is_read_too(tmp_path):
     with (tmp_path / 'a.mcap').open('wb') as stream:
         writer = McapWriter(stream)

@@ -19,6 +19,7 @@ LOG_TIME = -16  # [B] its log time, counted from the data
 BESIDES = 22  # [B] in its length besides the data
 PLAIN_CDR = 0x0100  # the first two bytes of a message in plain CDR, little endian
 BILLION = 1_000_000_000
+TOGETHER = 64  # messages of which the fields are copied at once
 SHORTEST = 64  # [B] so that views of words have several elements, which numba tells from one
 
 
@@ -125,27 +126,34 @@ def decode(
     at, stop, head, one = np.uint64(0), np.uint64(end), np.uint64(HEAD), np.uint64(1)
     n, room, whole = np.uint64(first), np.uint64(out.shape[1]), np.uint64(size + BESIDES)
     checks, fields, stamps = np.uint64(len(places)), np.uint64(len(offsets)), np.uint64(len(times))
+    begins, most = np.empty(TOGETHER, np.uint64), np.uint64(TOGETHER)
     while at + head <= stop:
-        length = words.w8[at + one]
-        if words.w1[at] != MESSAGE or length > stop - at - head or length < np.uint64(BESIDES):
-            return -1
-        if words.w2[at + np.uint64(CHANNEL_AT)] == channel:
-            if length != whole or n == room:
+        found = np.uint64(0)
+        while found < most and at + head <= stop:  # find some messages
+            length = words.w8[at + one]
+            if words.w1[at] != MESSAGE or length > stop - at - head or length < np.uint64(BESIDES):
                 return -1
-            same = words.w2[at + np.uint64(BODY_AT)] == PLAIN_CDR
-            for j in range(checks):
-                same = same and words.w4[at + places[j]] == values[j]
-            if not same:
-                return -1
-            for j in range(fields):
-                out[j, n] = words.w8[at + offsets[j]]
-            for j in range(stamps):
-                place = at + times[j]
+            if words.w2[at + np.uint64(CHANNEL_AT)] == channel:
+                if length != whole or n + found == room:
+                    return -1
+                same = words.w2[at + np.uint64(BODY_AT)] == PLAIN_CDR
+                for j in range(checks):
+                    same = same and words.w4[at + places[j]] == values[j]
+                if not same:
+                    return -1
+                begins[found] = at
+                found += one
+            at += head + length
+        for j in range(fields):  # field by field: half the time of message by message
+            for k in range(found):
+                out[j, n + k] = words.w8[begins[k] + offsets[j]]
+        for j in range(stamps):
+            for k in range(found):
+                place = begins[k] + times[j]
                 second = np.int64(np.int32(words.w4[place]))
                 nanosecond = np.int64(words.w4[place + np.uint64(4)])
-                out[fields + j, n] = second * BILLION + nanosecond
-            n += one
-        at += head + length
+                out[fields + j, n + k] = second * BILLION + nanosecond
+        n += found
     return int(np.int64(n)) - first if at == stop else -1
 
 

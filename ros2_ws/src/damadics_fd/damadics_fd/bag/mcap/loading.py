@@ -20,6 +20,8 @@ THREADS = min(3, len(os.sched_getaffinity(0)))
 AHEAD = THREADS + 1  # chunks loaded and not yet asked for
 FEW = 3  # chunks, for which no thread is started
 LARGE = 1 << 24  # [B] a larger chunk is not loaded ahead, so that memory stays bounded
+KEPT = 1 << 22  # [B] memory of a slot that the next file takes over
+_spare: list[Slot] = []  # of files that are closed: new memory costs as much as what is read
 
 
 class _Ahead(NamedTuple):
@@ -82,7 +84,12 @@ class Loader:
         return self._present.load(self._fd, at, length, self._limits)
 
     def _slot(self) -> Slot:
-        return self._free.pop() if self._free else Slot()
+        for slots in (self._free, _spare):
+            try:
+                return slots.pop()
+            except IndexError:  # of `_spare` other threads take, too
+                continue
+        return Slot()
 
     def _look_ahead(self, at: int) -> None:
         while self._pool and self._listed and len(self._ahead) < AHEAD:
@@ -97,3 +104,9 @@ class Loader:
         if self._pool:
             self._pool.shutdown(cancel_futures=True)
             self._pool = None
+        # not the present one: its chunk may still be looked at
+        slots = [*self._free, *(one.slot for one in self._ahead)]
+        self._free.clear()
+        self._ahead.clear()
+        small = [slot for slot in slots if slot.size <= KEPT]
+        _spare.extend(small[: max(AHEAD - len(_spare), 0)])

@@ -32,6 +32,11 @@ class Slot:
         self._data = np.empty(0, np.uint8)
         self._zstd = zstandard.ZstdDecompressor()
 
+    @property
+    def size(self) -> int:
+        """Memory that it holds [B]."""
+        return len(self._packed) + len(self._data)
+
     def load(self, fd: int, at: int, length: int, limits: Limits) -> NDArray[np.uint8]:
         """
         Read the content of a Chunk record, decompress it and check its CRC.

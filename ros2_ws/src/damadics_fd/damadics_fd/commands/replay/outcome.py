@@ -116,13 +116,12 @@ def evidence(event: Event, zero: int) -> Detection:
 def collect(detections: list[Detection], events: Iterable[Event], zero: int) -> None:
     """Add new detections; a cause that becomes known later is put into its detection."""
     for event in events:
-        present = evidence(event, zero)
         if event.transition == RAISED:
-            detections.append(present)
+            detections.append(evidence(event, zero))
             continue
         told = event.cause or event.test
         if told and detections and detections[-1]['occurrence'] == event.occurrence:
-            last = detections[-1]
+            last, present = detections[-1], evidence(event, zero)
             last['cause'], last['confidence'] = present['cause'], present['confidence']
             last['strength'], last['spread'] = present['strength'], present['spread']
             last['candidates'] = present['candidates']
