@@ -102,6 +102,7 @@ def main() -> None:
     p.add_argument('--fast', type=int, default=20, help='at 50 Hz')
     p.add_argument('--signals', type=int, default=7, choices=range(2, 8), help='of each valve')
     p.add_argument('--seconds', type=float, default=20.0)
+    p.add_argument('--behind', type=float, default=0.0, help='share of time the server lags by')
     p.add_argument('--port', type=int, default=48400)
     p.add_argument('--bare', action='store_true', help=argparse.SUPPRESS)
     options = p.parse_args()
@@ -129,7 +130,7 @@ def main() -> None:
     config = {'server': url, 'publish': 'blocks', 'valves': valves}
     (folder / 'plant.yaml').write_text(yaml.safe_dump(config, sort_keys=False))
     size = [str(options.valves), '--rate', '1', '--fast', str(options.fast)]
-    size += ['--signals', str(options.signals)]
+    size += ['--signals', str(options.signals), '--behind', str(options.behind)]
     rclpy.init(domain_id=domain)
     node = rclpy.create_node('bench')
     rows: dict[int, dict[int, float]] = {}  # position by stamp, by valve

@@ -144,6 +144,46 @@ def test_samples_in_json_and_sparkplug(processes, domain, tmp_path, broker):
     peer.close()
 
 
+def test_samples_in_end_with_the_broker_and_go_on_with_it(processes, domain, tmp_path, broker):
+    start(
+        processes,
+        tmp_path,
+        {
+            'broker': f'mqtt://127.0.0.1:{broker.port}',
+            'stamp': {'field': 'ts', 'unit': 'ms'},
+            'period': 0.2,
+            'valves': {'lv1': {'topic': 'plant/lv1', 'signals': {'cv': 'sp', 'x1': 'pos'}}},
+        },
+    )
+    peer = Peer(domain, publishes=False)
+    taken = peer.listen(Measurement, '/lv1/measurement', qos.SAMPLES)
+    told = peer.listen(DiagnosticArray, '/diagnostics', qos.DIAGNOSTICS)
+    assert peer.wait(lambda: told and 'nothing yet' in told[-1].status[0].message, 30.0)
+    plc = Program(broker.port, 'plant/lv1')
+    now = time.time_ns() // MS
+
+    def send(n):
+        plc.publish('plant/lv1', {'ts': now + 200 * n, 'sp': 0.5, 'pos': 0.001 * n})
+
+    for n in range(5):
+        send(n)
+    assert peer.wait(lambda: len(taken) == 5)
+    broker.kill()
+    assert peer.wait(lambda: told[-1].status[0].level == b'\x02'), 'told as lost'
+    broker.start()
+    assert peer.wait(lambda: told[-1].status[0].level != b'\x02', 30.0)
+    assert wait_for(plc.client.is_connected, 30.0)
+    for n in (3, 4, 100, 101, 102):  # a device repeats what it is not sure of
+        send(n)
+    assert peer.wait(lambda: len(taken) >= 8), processes.log('mqtt').read_text()
+    assert [stamp(m) for m in taken] == [(now + 200 * n) * MS for n in (*range(5), 100, 101, 102)]
+    assert peer.wait(lambda: told[-1].status[0].level == b'\x00')
+    values = {pair.key: pair.value for pair in told[-1].status[0].values}
+    assert values['Gaps'] == '1' and values['Last gap'].startswith('lv1: ')
+    plc.close()
+    peer.close()
+
+
 def test_judgements_out_survive_the_broker_and_say_when_we_are_gone(
     processes, domain, tmp_path, broker
 ):

@@ -126,7 +126,7 @@ def test_samples_have_source_time_quality_and_units_and_hold_what_does_not_chang
     server.tell('LV0.PV 0.6 Double 0x40000000 -')  # Uncertain
     assert c.wait(lambda: c.samples['lv0'][-1].x1 == 0.6)
     assert c.wait(lambda: 'lv0 x1' in c.values()['Uncertain'])
-    server.tell('LV0.CV garbage String 0 -')
+    server.tell(f'LV0.CV {"x" * 10_000} String 0 -')  # ten megabytes
     assert c.says('bad: lv0 cv: String where a number is expected')
     assert c.wait(lambda: math.isnan(c.samples['lv0'][-1].cv))
     assert c.samples['lv1'][-1].cv == 0.5

@@ -6,7 +6,10 @@ import sqlite3
 
 import pytest
 from alarm_events import event
+from damadics_dashboard.live.unseen import Unseen
 from damadics_dashboard.store.history import History, Wanted
+from damadics_dashboard.words.texts import texts
+from damadics_dashboard.words.valve_words import history_rows
 from damadics_fd.store.access import Access, Grant, Role
 from damadics_msgs.msg import FaultEvent
 
@@ -26,6 +29,42 @@ def test_history_survives_and_takes_a_repeated_event_once(tmp_path):
     assert [row['transition'] for row in second.latest()] == [0, 1, 0]
     assert second.valves() == ['lv101']
     second.close()
+
+
+def test_a_history_of_before_gets_what_it_lacks_and_keeps_its_rows(tmp_path):
+    path = tmp_path / 'history.sqlite'
+    first = History(path)
+    first.add(event(FaultEvent.RAISED))
+    first.close()
+    with sqlite3.connect(path) as database:
+        database.execute('ALTER TABLE event DROP COLUMN unseen')
+    second = History(path)
+    assert not second.problem
+    second.add({**event(FaultEvent.CLEARED, 'cleared'), 'unseen': 120.0})
+    assert [row['unseen'] for row in second.latest()] == [120.0, None]
+    second.close()
+
+
+def test_time_without_data_is_told_beside_how_long_an_alarm_lasted():
+    unseen, second = Unseen(), 10**9
+    for t in [*range(100), *range(220, 306)]:  # the driver is gone for two minutes
+        unseen.judged(t * second, 1 if t >= 50 else 0, present=t >= 50)
+    end = event(FaultEvent.CLEARED, stamp=306 * second) | {'duration': 256.0}
+    unseen.tell(end)
+    assert end['unseen'] == 121.0
+    (row,) = history_rows([end], texts('en'))
+    assert row['text'] == 'It lasted 4 min 16 s, 2 min 1 s of it without data.'
+    unseen.judged(307 * second, 1, present=False)
+    unseen.judged(500 * second, 2, present=True)
+    assert unseen.seconds == 0.0, 'it was no alarm, then'
+
+
+@pytest.mark.parametrize('period', [0.1, 1.0, 10.0])
+def test_a_slow_valve_is_not_unseen(period):
+    unseen = Unseen()
+    for n in range(1, 100):
+        unseen.judged(round(n * period * 1e9), 1, present=True)
+    assert unseen.seconds == 0.0
 
 
 def test_history_finds_by_word_valve_kind_and_time(tmp_path):

@@ -162,7 +162,7 @@ def load_causes(path: Path | None = None, language: str = 'en') -> CauseTable:
     :raises OSError: if the file cannot be read.
 
     >>> load_causes()['spring_softer'].describe('LV-101', -0.05, 0.0005, 0.99)[0]
-    'LV-101: The spring is 5.0% softer than learned. (-5.0% ± 0.1%, confidence 99%)'
+    'LV-101: The spring is 5.0 % softer than learned. (-5.0 % ± 0.1 %, confidence 99 %)'
     """
     causes, limits = _parse(_own('causes.yaml'), 'causes.yaml')
     if language != 'en':

@@ -15,6 +15,7 @@ from damadics_msgs.msg import FaultEvent, FaultFlag, Isolation, Signature
 
 from damadics_dashboard.live.raw import Batch
 from damadics_dashboard.live.traces import Trace
+from damadics_dashboard.live.unseen import Unseen
 from damadics_dashboard.store.rows import EventRow
 
 HEARTBEAT_LOST = 2.0  # s; the detector repeats its flag every second
@@ -80,6 +81,7 @@ class Valve:
         self.flag_at = -1e9
         self.threshold_at = -1e9
         self.judged = -1  # ns, stamp of the flag that its age was last counted from
+        self.unseen = Unseen()
         self.freshness = Freshness(simulated)
         self.signature: Signature | None = None
         self.isolation: Isolation | None = None
@@ -155,6 +157,8 @@ class Valve:
             self.tag = plain(flag.header.frame_id, NAME)
         self.flag, self.flag_at = flag, now
         stamp = judged_stamp(flag)
+        if stamp is not None:
+            self.unseen.judged(stamp, flag.occurrence, present=flag.fault)
         if stamp is not None and self.threshold_at < 0.0 and stamp != self.judged:
             self.freshness.heard(stamp, now)
             self.judged = stamp
@@ -314,6 +318,7 @@ class Valve:
                 'residual': flag.residual,
                 'threshold': flag.threshold,
                 'duration': max(stamp - onset, 0) / NANO,
+                'unseen': self.unseen.seconds,
             }
             if flag.threshold > 0.0:
                 now = flag.residual / flag.threshold

@@ -288,9 +288,10 @@ class Watcher:
         return self.valves.setdefault(name, Valve(name, self._simulated))
 
     def _note_event(self, name: str, message: FaultEvent) -> None:
-        event = event_row(name, message)
+        event, valve = event_row(name, message), self._valve(name)
+        valve.unseen.tell(event)
         if self.history.add(event):
-            self._valve(name).take_event(event)
+            valve.take_event(event)
 
     def _meet_fleet(self, topic: str, parent: str) -> None:
         """Take what one process says of its many valves."""

@@ -144,12 +144,13 @@ class _View:
 
 def _action(row: ActionRow, t: Texts) -> dict[str, str]:
     key = f'action_{row["action"]}'
+    role = row['role'] and t.entries.get(f'role_{row["role"]}', row['role'])
     return {
         'moment': t.moment(int(row['seen'] * 1e9)),
         'valve': row['valve'] or '–',
         'address': address(row['valve']) if row['valve'] else '',
         'what': t.entries.get(key, row['action']),
-        'who': f'{row["user"] or t("nobody")}' + (f' ({row["role"]})' if row['role'] else ''),
+        'who': f'{row["user"] or t("nobody")}' + (f' ({role})' if role else ''),
         'comment': row['comment'] or '',
         'result': ('' if row['done'] else f'{t("refused")}: ') + (row['result'] or ''),
     }

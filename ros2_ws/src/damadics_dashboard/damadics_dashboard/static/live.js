@@ -28,10 +28,11 @@
     if (!body) return;
     if (body.dataset.link !== present) {
       body.dataset.link = present;
-      const place = document.getElementById('link');
-      if (place && words[present]) place.textContent = words[present];
       if (present === 'lost') say(words.lost);
     }
+    const place = document.getElementById('link'); // it may come later than the first loss
+    const word = words[present];
+    if (place && word && place.textContent !== word) place.textContent = word;
     // what the framework names in its own language, or not at all
     const root = document.documentElement;
     if (words.language && root.lang !== words.language) root.lang = words.language;

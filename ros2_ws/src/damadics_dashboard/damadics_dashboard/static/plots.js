@@ -126,14 +126,14 @@
       chart.on('datazoom', () => zoomed(id));
     }
     if (!entry.watched) watch(id, entry);
+    const empty = entry.data.every((points) => !points.length);
+    const place = document.querySelector(`[data-plot="${id}"]`);
+    if (place && entry.told) place.hidden = !empty;
     if (entry.hidden) { entry.late = true; return; }
     const option = { series: entry.data.map((points) => ({ data: points })) };
     if (entry.range && !entry.spec.xy) option.xAxis = axis(entry, chart);
     if (entry.areas) option.series[0].markArea = { data: entry.areas };
     chart.setOption(option, { lazyUpdate: true });
-    const empty = entry.data.every((points) => !points.length);
-    const place = document.querySelector(`[data-plot="${id}"]`);
-    if (place && entry.told) place.hidden = !empty;
   }
 
   // What is out of sight is not drawn until it comes into sight.

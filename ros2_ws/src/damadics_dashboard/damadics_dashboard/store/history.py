@@ -32,7 +32,9 @@ EVENT = {
     'strength': 'REAL',
     'text': 'TEXT',
     'advice': 'TEXT',
+    'unseen': 'REAL',
 }
+LATER = ('unseen',)  # columns that files of 0.1 do not have
 ACTION = {
     'valve': 'TEXT',
     'seen': 'REAL',
@@ -82,7 +84,7 @@ class History:
     def __init__(self, path: Path) -> None:
         self._lock = threading.Lock()
         self._db, self.problem = open_database(
-            path, {'event': EVENT, 'action': ACTION, 'tag': TAG}, INDEXES
+            path, {'event': EVENT, 'action': ACTION, 'tag': TAG}, INDEXES, LATER
         )
         self._waiting: deque[tuple[str, EventRow | ActionRow]] = deque(maxlen=MOST_WAITING)
         # A detector repeats its last events to a newcomer, such as this page after its restart.
@@ -114,7 +116,7 @@ class History:
         if self._known[key]:
             self._known[key] -= 1
             return False
-        self._write('event', {**event, 'seen': time.time()})
+        self._write('event', {'unseen': None, **event, 'seen': time.time()})
         return True
 
     def add_action(self, action: ActionRow, stamp: int | None = None) -> bool:

@@ -26,6 +26,7 @@ class EventRow(TypedDict, total=False):
     strength: float | None
     text: str
     advice: str
+    unseen: float | None  # s of the duration without data
     deviation: float  # this and the next: not in the history
     found_by: str
 

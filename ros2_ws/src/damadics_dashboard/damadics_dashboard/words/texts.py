@@ -14,6 +14,7 @@ from damadics_fd.causes import CauseTable, load_causes
 from damadics_fd.core.stamps import SECOND, is_date
 
 LANGUAGES = {'en': 'English', 'de': 'Deutsch'}
+LONG = 1100.0  # days, above which a duration is told in years
 DASH = '–'
 Word = str | float | int
 _edited: list[Path] = []  # the file of `use_causes`
@@ -85,7 +86,9 @@ class Texts:
         :return: short text.
 
         >>> texts('en').duration(0.31), texts('en').duration(599.9), texts('en').duration(7300.0)
-        ('0.3 s', '10 min 0 s', '2 h 1 min')
+        ('0.3 s', '10 min 0 s', '2 h 2 min')
+        >>> texts('en').duration(165 * 86400.0), texts('en').duration(4917 * 86400.0)
+        ('165 days', '13 years')
         """
         if seconds is None or not math.isfinite(seconds):
             return DASH
@@ -100,7 +103,10 @@ class Texts:
         minutes = round(whole / 60.0)
         if minutes < 48 * 60:
             return f'{minutes // 60} h {minutes % 60} min'
-        return self('days', number=f'{seconds / 86400.0:.0f}')
+        days = seconds / 86400.0
+        if days < LONG:
+            return self('days', number=f'{days:.0f}')
+        return self('years', number=f'{days / 365.25:.0f}')
 
     def moment(self, stamp: int) -> str:
         """

@@ -185,7 +185,7 @@ def alarm_words(valve: Valve, alarm: Alarm, t: Texts, *, name: bool) -> AlarmWor
         (t('largest_residual'), of_limit(ratio, t)),
         (t('residual_now'), t.number(e.get('residual'), unit)),
         (t('limit'), t.number(limit, unit)),
-        (t('duration'), t.duration(e.get('duration'))),
+        (t('duration'), _lasting(e, t)),
         (t('since'), t.moment(alarm.onset)),
     ]
     letter = NE107.get(alarm.level, 'C') or 'M'
@@ -247,7 +247,7 @@ def _row(row: EventRow, t: Texts) -> dict[str, Cell]:
     if transition in (FaultEvent.RAISED, FaultEvent.CHANGED):
         what, numbers, advice = headline(row, t)
     elif transition == FaultEvent.CLEARED and row['duration'] is not None:
-        what = t('lasted', time=t.duration(row['duration']))
+        what = t('lasted', time=_lasting(row, t))
     told = plain(row['text'] or '', SENTENCE)
     if faults_of(row['cause'] or ''):  # the sentence says how much is off
         advice = f'{told}. {advice}'
@@ -262,6 +262,12 @@ def _row(row: EventRow, t: Texts) -> dict[str, Cell]:
         'text': f'{what} {numbers}'.strip() or told,
         'more': advice,
     }
+
+
+def _lasting(event: EventRow, t: Texts) -> str:
+    """Word how long a fault was there, and how much of it nobody could look."""
+    time, unseen = t.duration(event.get('duration')), event.get('unseen')
+    return t('part_unseen', time=time, unseen=t.duration(unseen)) if unseen else time
 
 
 def of_limit(ratio: float | None, t: Texts) -> str:

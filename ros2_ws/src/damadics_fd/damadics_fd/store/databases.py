@@ -4,7 +4,7 @@
 
 import sqlite3
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from itertools import count
 from pathlib import Path
 
@@ -15,7 +15,7 @@ Tables = Mapping[str, Mapping[str, str]]  # type of each column by table
 
 
 def open_database(
-    path: Path, tables: Tables, more: Sequence[str] = ()
+    path: Path, tables: Tables, more: Sequence[str] = (), later: Collection[str] = ()
 ) -> tuple[sqlite3.Connection, str]:
     """
     Open a database, and make what is not in it yet.
@@ -23,12 +23,13 @@ def open_database(
     :param path: the file; it is made where it is missing.
     :param tables: their columns.
     :param more: further statements, such as those of indexes.
+    :param later: columns that files of earlier versions do not have: they get them, empty.
     :return: the connection, and what happened to a damaged file ('' where there was none).
     :raises OSError: where the folder cannot be written or another process holds the file.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     try:
-        return _opened(path, tables, more), ''
+        return _opened(path, tables, more, later), ''
     except DAMAGED as problem:
         if 'locked' in str(problem) or not path.exists():
             raise OSError(f'{path}: {problem}') from problem
@@ -37,7 +38,7 @@ def open_database(
         for suffix in ('-wal', '-shm'):
             path.with_name(path.name + suffix).unlink(missing_ok=True)
         try:
-            return _opened(path, tables, more), f'{problem}; the file of before is {aside}'
+            return _opened(path, tables, more, later), f'{problem}; the file of before is {aside}'
         except DAMAGED as again:
             raise OSError(f'{path}: {again}') from again
 
@@ -54,7 +55,9 @@ def _text(data: bytes) -> str:
     return data.decode(errors='replace')
 
 
-def _opened(path: Path, tables: Tables, more: Sequence[str]) -> sqlite3.Connection:
+def _opened(
+    path: Path, tables: Tables, more: Sequence[str], later: Collection[str]
+) -> sqlite3.Connection:
     database = sqlite3.connect(path, timeout=PATIENCE, check_same_thread=False)
     database.text_factory = _text
     try:
@@ -64,7 +67,11 @@ def _opened(path: Path, tables: Tables, more: Sequence[str]) -> sqlite3.Connecti
             described = ', '.join(f'{name} {kind}' for name, kind in columns.items())
             database.execute(f'CREATE TABLE IF NOT EXISTS {table} ({described})')
             there = {row[1] for row in database.execute(f'PRAGMA table_info({table})')}
-            if not set(columns) <= there:
+            missing = set(columns) - there
+            if missing and missing <= set(later):
+                for name in missing:
+                    database.execute(f'ALTER TABLE {table} ADD COLUMN {name} {columns[name]}')
+            elif missing:
                 raise sqlite3.DatabaseError(f'its table {table} has other columns')
         for statement in more:
             database.execute(statement)
