@@ -47,7 +47,7 @@ def year(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         for valve, day, kind, more in (
             ('lv101', 100, FaultEvent.RAISED, {}),
-            ('lv101', 101, FaultEvent.CLEARED, {}),
+            ('lv101', 101, FaultEvent.CLEARED, {'duration': 86400.0, 'unseen': 7200.0}),
             ('lv101', 360, FaultEvent.RAISED, {}),
             ('lv101', 360.1, FaultEvent.CHANGED,
              {'cause': 'friction_up', 'strength': 1.65, 'confidence': 0.99}),
@@ -87,6 +87,9 @@ def test_a_valve_year_tells_cause_size_dates_and_who_did_what(year, tmp_path, ca
         '+165 %',
         'Check the packing',
         'Anna',
+        'Greatest',  # no word is parted by the width of its column
+        '2 h 0 min of it without data',
+        '\n100\n200\n300\n',  # a scale of round numbers
     ):
         assert wanted in text, wanted
     assert time.strftime('%Y-%m-%d', time.localtime(BEGIN)) in text

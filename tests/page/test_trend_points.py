@@ -100,4 +100,11 @@ def test_the_outlook_is_said_in_a_sentence(tmp_path):
     assert 'days' in said
     calm = outlook_words('friction', found, (-0.5,), 99 * DAY, texts('de'))
     assert calm.endswith('Keine Bewegung auf eine Grenze zu.')
+    slow = Intervals(tmp_path / 'slow.sqlite')
+    for day in range(100):
+        slow.add('v', day * DAY, {'preload': 3.0 - 1e-4 * day}, {'preload': 1e-3})
+    found = slow.series('v', 'preload', 0.0, 100 * DAY)
+    said = outlook_words('preload', found, (-150.0,), 99 * DAY, texts('en'))
+    assert said.endswith('It does not move towards a limit.'), 'in 4000 years'
+    slow.close()
     store.close()

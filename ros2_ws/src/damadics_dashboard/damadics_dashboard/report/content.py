@@ -14,7 +14,7 @@ from damadics_dashboard.store.history import History, Wanted
 from damadics_dashboard.store.rows import ActionRow, EventRow
 from damadics_dashboard.words.outlook import outlook_words, value_words
 from damadics_dashboard.words.texts import Texts
-from damadics_dashboard.words.valve_words import TRANSITIONS, found_by, headline, of_limit
+from damadics_dashboard.words.valve_words import TRANSITIONS, found_by, headline, history_rows
 
 DAY = 86400.0
 MOST_EVENTS = 5000
@@ -222,7 +222,7 @@ def fleet_report(sources: Sources, since: float, until: float, t: Texts) -> Repo
         t('report_fleet'),
         _period(since, until, t),
         [
-            (t('valves'), str(len(valves))),
+            (t('valves').capitalize(), str(len(valves))),
             (t('alarms'), str(len(alarms))),
             (t('alarms_a_day'), t.number(a_day)),
             (t('mtbf'), t.duration(mtbf)),
@@ -244,14 +244,9 @@ def _heads(t: Texts) -> list[str]:
 
 
 def _event(event: EventRow, t: Texts) -> list[str]:
-    what, numbers, advice = headline(event, t)
-    told = event['transition'] in (FaultEvent.RAISED, FaultEvent.CHANGED)
-    return [
-        t.moment(event['stamp']),
-        t(TRANSITIONS[event['transition']]) if event['transition'] in TRANSITIONS else '?',
-        of_limit(event['ratio'], t),
-        f'{what} {numbers} {advice}'.strip() if told else event['text'] or '',
-    ]
+    (row,) = history_rows([event], t)
+    words = f'{row["text"]} {row["more"]}'.strip()
+    return [str(row['moment']), str(row['what']), str(row['ratio']), words]
 
 
 def _action(row: ActionRow, t: Texts) -> list[str]:

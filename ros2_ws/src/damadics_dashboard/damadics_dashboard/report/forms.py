@@ -21,6 +21,8 @@ from damadics_dashboard.words.templates import render
 from damadics_dashboard.words.texts import Texts
 
 MOST_POINTS = 700  # of a drawn curve: more than the paper shows
+FLAT = 1e-3  # share of a value that is no change
+SMALLEST = 1e-9
 TREND_COLUMNS = ('quantity', 'unit', 'time', 'length_s', *STATISTICS, 'reference')
 Pair = tuple[float, float]
 
@@ -114,7 +116,10 @@ def _chart(
     mean = mean * factor
     near = [v * factor for v in limits]
     low, high = float(least.min()), float(greatest.max())
-    pad = max(0.08 * (high - low), 1e-6 * max(abs(low), abs(high), 1.0))
+    pad = 0.08 * (high - low)
+    if high - low < FLAT * max(abs(low), abs(high)):
+        pad = 0.05 * max(abs(low), abs(high))  # what stands still is drawn as a straight line
+    pad = max(pad, SMALLEST)
     near = [v for v in near if low - 3 * (high - low + pad) < v < high + 3 * (high - low + pad)]
     low, high = min([low, *near]) - pad, max([high, *near]) + pad
     span = max(float(start[-1] - start[0]), 1.0)
@@ -132,10 +137,24 @@ def _chart(
         list(zip(x, y(mean), strict=True)),
         upper + lower[::-1],
         y(np.array(near)),
-        [(share, low + share * (high - low)) for share in (0.1, 0.5, 0.9)],
+        [((value - low) / (high - low), value) for value in _ticks(low, high)],
         _day(start[0]),
         _day(start[-1]),
     )
+
+
+def _ticks(low: float, high: float) -> list[float]:
+    """
+    Return two to six round numbers between two others.
+
+    >>> _ticks(-0.43, 0.43), _ticks(0.97, 1.03), _ticks(-60.0, 310.0)
+    ([-0.4, -0.2, 0.0, 0.2, 0.4], [0.98, 1.0, 1.02], [0.0, 100.0, 200.0, 300.0])
+    """
+    least = (high - low) / 5.0
+    power = 10.0 ** math.floor(math.log10(least))
+    step = next(power * n for n in (1.0, 2.0, 5.0, 10.0) if power * n >= least)
+    first, last = math.ceil(low / step), math.floor(high / step)
+    return [round(n * step, 12) + 0.0 for n in range(first, last + 1)]
 
 
 def _day(seconds: float) -> str:

@@ -21,6 +21,8 @@ Color = tuple[int, int, int]
 WIDTH, HEIGHT = 180.0, 34.0  # mm, of a chart
 FONT = 'DejaVu'
 LONGEST_WORD = 60  # characters that fit on a line of a table
+ROOM = 28.0  # mm, of a heading and the first rows of its table
+PADDING = 3.0  # mm, of a cell of a table
 MOST_CHARTS = 3  # what is left of the first page
 
 
@@ -48,6 +50,7 @@ def pdf(report: Report, t: Texts) -> bytes:
         paper.chart(chart, t)
     for title, heads, rows in report.tables:
         if rows:
+            paper.room(ROOM)
             paper.heading(title, 12.0)
             paper.table_of(heads, rows)
     return bytes(paper.output())
@@ -92,13 +95,10 @@ class _Paper(FPDF):
         self.set_font(FONT, size=7.5)
         self.set_text_color(*INK)
         self.set_draw_color(*LINE)
-        longest = [
-            min(max(len(str(row[n])) for row in [heads, *rows]), LONGEST_WORD) + 2
-            for n in range(len(heads))
-        ]
+        columns = [[str(row[n]) for row in [heads, *rows]] for n in range(len(heads))]
         with self.table(
             width=WIDTH,
-            col_widths=tuple(longest),
+            col_widths=self._widths(columns),
             line_height=4.0,
             text_align='LEFT',
             borders_layout='HORIZONTAL_LINES',
@@ -109,6 +109,21 @@ class _Paper(FPDF):
                 row = table.row()
                 for text in line:
                     row.cell(_broken(str(text)))
+
+    def _widths(self, columns: list[list[str]]) -> tuple[float, ...]:
+        """Part the page among columns: no word is broken, the rest by how much there is to say."""
+        self.set_font(FONT, 'B', 7.5)
+        width = self.get_string_width
+        least = [max(width(w) for x in texts for w in (*x.split(), ' ')) for texts in columns]
+        least = [min(each, WIDTH / 3.0) + PADDING for each in least]
+        wanted = [
+            max(max(map(width, texts)) + PADDING - each, 0.1)
+            for texts, each in zip(columns, least, strict=True)
+        ]
+        wanted = [min(each, WIDTH) for each in wanted]
+        left = max(WIDTH - sum(least), 0.0) / sum(wanted)
+        self.set_font(FONT, size=7.5)
+        return tuple(each + left * more for each, more in zip(least, wanted, strict=True))
 
     def signature(self, lines: SignatureLines, t: Texts) -> None:
         """Draw force over position, fault-free and at the end."""
@@ -126,10 +141,14 @@ class _Paper(FPDF):
         self.set_y(top + HEIGHT + 1.0)
         self.line_of(t('signature_report'), 7.0, MUTED)
 
+    def room(self, height: float) -> None:
+        """Begin a page where less than that is left of this one [mm]."""
+        if self.get_y() + height > self.page_break_trigger:
+            self.add_page()
+
     def chart(self, chart: Chart, t: Texts) -> None:
         """Draw a trend: band of least and greatest, mean, limits."""
-        if self.get_y() + HEIGHT + 14.0 > self.page_break_trigger:
-            self.add_page()
+        self.room(HEIGHT + 14.0)
         self.heading(f'{chart.name} [{chart.unit}]', 9.0)
         left, top = self.get_x() + 16.0, self.get_y() + 1.0
         width = WIDTH - 16.0

@@ -23,6 +23,7 @@ UNITS = {  # factor from what is stored, unit shown
 }
 CHANGES = ('spring', 'preload', 'friction')  # told with their sign: against the reference
 LEAST_STD = 1e-6
+FAR = 30 * 365.25 * 86400.0  # s; nobody plans for what is further away
 
 
 def factor_of(quantity: str) -> float:
@@ -98,7 +99,7 @@ def outlook_words(
     times = [(line.time_to(limit, now), limit) for limit in limits]
     time, limit = min(times, key=lambda pair: (pair[0].expected, pair[0].earliest))
     shown = value_words(quantity, limit, t)
-    if math.isinf(time.expected):
+    if time.expected > FAR:
         return f'{said} {t("trend_steady")}'
     if time.expected == 0.0:
         return f'{said} {t("trend_beyond", limit=shown)}'
