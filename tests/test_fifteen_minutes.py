@@ -83,7 +83,7 @@ def first(tmp_path_factory, chromium):
                 processes=processes,
                 folder=folder,
                 bag=folder / 'bag',
-                tile=website.Tile(address, VALVE, chromium and chromium.new_page()),
+                tile=website.Tile(address, VALVE, chromium and website.new_page(chromium)),
             )
             if not processes.ended('run'):
                 processes.end('run', 90.0)

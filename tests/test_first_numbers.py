@@ -80,7 +80,7 @@ def test_the_report_compares_with_what_else_there_is(tmp_path, chromium, monkeyp
     assert done.returncode == 0, done.stderr
     report = tmp_path / 'index.html'
     if chromium:
-        page = chromium.new_page()
+        page = website.new_page(chromium)
         errors: list[str] = []
         page.on('pageerror', lambda error: errors.append(str(error)))
         page.goto(report.as_uri())

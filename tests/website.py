@@ -78,6 +78,13 @@ def browser() -> Iterator[Any]:
         chromium.close()
 
 
+def new_page(browser: Any, **options: Any) -> Any:
+    """Open a page of a browser, or of a context of it, that is as patient as the other tests."""
+    page = browser.new_page(**options)
+    page.set_default_timeout(1000.0 * PATIENCE)
+    return page
+
+
 class Tile:
     """
     The tile of one valve: on the page in a browser, or else as the page's server has it.

@@ -29,6 +29,7 @@ from damadics_msgs.srv import Acknowledge, Reference, Relearn, ResetAlarm, Shelv
 from lifecycle_msgs.srv import ChangeState
 
 CONFIGURE, CLEANUP, ACTIVATE, DEACTIVATE = 1, 2, 3, 4
+START = 300.0  # s that a node may take to start on a busy machine
 ODD_NUMBERS = (math.nan, math.inf, -math.inf, -1.0, 0.0, 5e-324, 1e-12, 1e308, 2.0**62)
 
 
@@ -216,10 +217,14 @@ def attack_signals(prey: Prey, count: int) -> None:
             prey.start(name, **folders_of(prey)[name])
             before = len(prey.flags)
             if name == 'detector':
-                prey.drive(60.0, until=lambda b=before: len(prey.flags) > b)
-                first = prey.flags[before] if len(prey.flags) > before else None
-                if first is None or (fault and not first.fault and first.state != UNKNOWN):
+                if not prey.drive(START, until=lambda b=before: len(prey.flags) > b):
+                    prey.found['no flag'] += 1
+                    print(f'signal {n}: no flag within {START:g} s of a start', flush=True)
+                    continue
+                first = prey.flags[before]
+                if fault and not first.fault and first.state != UNKNOWN:
                     prey.found['lost alarm'] += 1
+                    print(f'signal {n}: lost', prey.flags[before - 1], first, flush=True)
         end = time.monotonic() + chance.uniform(0.5, 3.0)
         while time.monotonic() < end:
             prey.drive(0.1)

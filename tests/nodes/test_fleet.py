@@ -74,7 +74,11 @@ def fleet(tmp_path_factory):
             )
             address = f'http://127.0.0.1:{port}'
             website.wait_until_served(address)
-            page = chromium.new_page(viewport={'width': 1280, 'height': 800}) if chromium else None
+            page = (
+                website.new_page(chromium, viewport={'width': 1280, 'height': 800})
+                if chromium
+                else None
+            )
             tiles = {v: website.Tile(address, v, page) for v in VALVES}
             yield SimpleNamespace(
                 peer=peer, flags=flags, tiles=tiles, page=page, run=processes.pid('run')

@@ -129,8 +129,7 @@ def system(tmp_path_factory):
 @pytest.fixture
 def page(system):
     """A page of the browser; any error in its scripts fails the test."""
-    page = system.browser.new_page(viewport={'width': 1440, 'height': 960})
-    page.set_default_timeout(30_000)
+    page = website.new_page(system.browser, viewport={'width': 1440, 'height': 960})
     errors = []
     page.on('pageerror', lambda error: errors.append(str(error)))
     yield page
@@ -142,7 +141,7 @@ def test_the_fleet_shows_a_valve_that_has_learned_as_healthy(system, page):
     page.goto(system.site.address)
     page.wait_for_selector(f'[data-valve={VALVE}]')
     system.valve.be_healthy()
-    page.wait_for_selector(f'[data-valve={VALVE}][data-kind=ok]', timeout=90_000)
+    page.wait_for_selector(f'[data-valve={VALVE}][data-kind=ok]')
     label = page.locator(f'[data-valve={VALVE}]').get_attribute('aria-label')
     assert label.startswith(f'{VALVE}: Healthy')
     assert page.locator('[role=list][aria-label=valves]').count() == 1
@@ -168,7 +167,7 @@ def test_the_plots_follow_five_times_a_second(system, page):
 
 def test_an_injected_fault_shows_within_a_second_of_its_flag(system, page):
     system.valve.be_healthy()
-    fleet = system.browser.new_page()
+    fleet = website.new_page(system.browser)
     fleet.goto(system.site.address)
     fleet.wait_for_selector(f'[data-valve={VALVE}][data-kind=ok]')
     page.goto(f'{system.site.address}/valve/{VALVE}')
@@ -184,7 +183,7 @@ def test_an_injected_fault_shows_within_a_second_of_its_flag(system, page):
     page.wait_for_selector('[data-occurrence] >> text=not acknowledged')
     fleet.close()
     if website.PICTURES:
-        page.wait_for_selector('[data-occurrence] >> text=stiffer than learned', timeout=120_000)
+        page.wait_for_selector('[data-occurrence] >> text=stiffer than learned')
         page.evaluate('scrollTo(0, 0)')
         website.picture(page, 'valve.png')
 
@@ -238,14 +237,15 @@ def test_a_killed_detector_greys_the_tile_within_a_second_and_its_alarm_comes_ba
     system.processes.start('damadics_fd', 'detector', arguments_of(SETTINGS, namespace=VALVE))
     page.wait_for_function(
         f"'MSF'.includes(document.querySelector('[data-valve={VALVE}]').dataset.kind)",
-        timeout=60_000,
     )
     page.wait_for_selector('[data-occurrence] .tag.done >> text=acknowledged')
 
 
 @pytest.mark.parametrize('address', ['/', f'/valve/{VALVE}', '/history', '/replay'])
 def test_a_phone_shows_every_page_without_sideways_scrolling(system, address):
-    phone = system.browser.new_page(viewport={'width': 390, 'height': 844}, color_scheme='dark')
+    phone = website.new_page(
+        system.browser, viewport={'width': 390, 'height': 844}, color_scheme='dark'
+    )
     phone.goto(system.site.address + address)
     phone.wait_for_selector('main')
     phone.wait_for_timeout(700)
@@ -284,7 +284,7 @@ def test_everything_can_be_reached_with_the_keyboard(system, page):
 def test_replay_of_a_golden_bag_shows_its_fault(system, page):
     page.goto(f'{system.site.address}/replay')
     page.set_input_files('.drop input[type=file]', str(BAG))
-    page.wait_for_selector('.banner >> text=the first at', timeout=120_000)
+    page.wait_for_selector('.banner >> text=the first at')
     assert 'fault f4 was simulated from 70.00 s, flagged' in page.locator('.banner').inner_text()
     page.wait_for_timeout(1500)
     website.picture(page, 'replay.png')

@@ -72,7 +72,7 @@ def unharmed(page) -> None:
 
 @pytest.mark.parametrize('address', PAGES)
 def test_no_text_from_outside_is_run_or_parsed(hostile, browser, address):
-    page = browser.new_page()
+    page = website.new_page(browser)
     foreign = []
     page.on('request', lambda r: foreign.append(r.url) if hostile.address not in r.url else None)
     page.goto(hostile.address + address)
@@ -92,7 +92,7 @@ def test_no_text_from_outside_is_run_or_parsed(hostile, browser, address):
 
 
 def test_a_name_and_a_comment_of_a_person_are_data_too(hostile, browser):
-    page = browser.new_page()
+    page = website.new_page(browser)
     page.goto(f'{hostile.address}/history')
     page.get_by_label('Comment, on the valve').fill(EVIL)
     page.get_by_label('Your name').fill(EVIL)
@@ -106,21 +106,21 @@ def test_a_name_and_a_comment_of_a_person_are_data_too(hostile, browser):
 
 
 def test_the_name_of_a_dropped_file_is_data(hostile, browser, tmp_path):
-    page = browser.new_page()
+    page = website.new_page(browser)
     page.goto(f'{hostile.address}/replay')
     name = '..\\<img src=x onerror=window.pwn=1>".mcap'
     page.set_input_files(
         '.drop input[type=file]',
         files=[{'name': name, 'mimeType': 'x/y', 'buffer': b'\x89MCAP0\r\n' + bytes(99)}],
     )
-    page.wait_for_selector('[role=alert] >> text=cannot be replayed', timeout=60_000)
+    page.wait_for_selector('[role=alert] >> text=cannot be replayed')
     unharmed(page)
     assert page.locator('.drop input[type=file]').is_enabled()
     page.close()
 
 
 def test_a_recording_that_cannot_be_replayed_leaves_the_page_as_it_was(site, browser):
-    page = browser.new_page()
+    page = website.new_page(browser)
     page.goto(f'{site.address}/replay')
     for name in ('../../../etc/passwd', 'x', ''):
         content = io.BytesIO()
@@ -133,7 +133,7 @@ def test_a_recording_that_cannot_be_replayed_leaves_the_page_as_it_was(site, bro
         page.set_input_files('.drop input[type=file]', files=[dropped])
         refused = '/cannot be replayed/.test(document.body.innerText)'
         done = f"document.querySelector('.banner') || {refused}"
-        page.wait_for_function(done, timeout=60_000)
+        page.wait_for_function(done)
         page.wait_for_selector('.drop input[type=file]:enabled', state='attached')
         page.reload()
     page.close()
@@ -141,7 +141,7 @@ def test_a_recording_that_cannot_be_replayed_leaves_the_page_as_it_was(site, bro
 
 @pytest.mark.parametrize('kind', ['html', 'csv', 'pdf'])
 def test_reports_show_texts_as_they_are(hostile, browser, kind):
-    page = browser.new_page()
+    page = website.new_page(browser)
     answer = page.request.get(f'{hostile.address}/report?of=hostile%2Fv1&days=1&as={kind}')
     assert answer.status == 200
     if kind == 'html':
@@ -161,7 +161,7 @@ def kinds(page) -> list[str]:
 
 def test_a_page_whose_server_is_gone_turns_grey_within_two_seconds(site, browser):
     site.voices.flag('watched', FaultFlag.STATE_HEALTHY, 'LV-1')
-    page = browser.new_page()
+    page = website.new_page(browser)
     page.goto(site.address)
     page.wait_for_selector('[data-valve=watched][data-kind=ok]')
     page.wait_for_function("document.body.dataset.link === 'good'")
@@ -182,12 +182,12 @@ def test_a_page_whose_server_is_gone_turns_grey_within_two_seconds(site, browser
         assert page.locator('[data-valve=watched] [data-age]').inner_text() != age
     finally:
         os.kill(site.processes.pid('dashboard'), signal.SIGCONT)
-    page.wait_for_function("document.body.dataset.link === 'good'", timeout=60_000)
+    page.wait_for_function("document.body.dataset.link === 'good'")
     page.close()
 
 
 def test_a_silent_valve_shows_that_and_its_open_alarm(site, browser):
-    page = browser.new_page()
+    page = website.new_page(browser)
     page.goto(f'{site.address}/valve/mute')
     page.wait_for_selector('text=There is no valve mute')
     site.voices.flag('mute', FaultFlag.STATE_ALARM, 'LV-2', occurrence=1, level=1, fault=True)
@@ -195,7 +195,7 @@ def test_a_silent_valve_shows_that_and_its_open_alarm(site, browser):
         'mute', FaultEvent.RAISED, 'LV-2', occurrence=1, level=1, cause='friction_up',
         strength=1.65, confidence=0.99, ratio=0.73,
     )  # fmt: skip
-    page.wait_for_selector('.banner[data-kind=M]', timeout=30_000)
+    page.wait_for_selector('.banner[data-kind=M]')
     site.voices.silent.add('mute')
     page.wait_for_selector('.banner[data-kind=off] >> text=Friction is 2.6 times normal')
     assert page.locator('.alarm >> text=Check the packing').is_visible()
@@ -218,7 +218,7 @@ def test_partial_strokes_are_asked_for_where_the_detector_allows_them(site, brow
     told = {'Commissioned': 'limited', 'Commissioned because': 'P1 is a constant'}
     voices.flag(valve, FaultFlag.STATE_HEALTHY, 'LC74_20')
     voices.diagnose(valve, tag='LV-7', **told, **{'Partial strokes': 'not allowed'})
-    page = browser.new_page()
+    page = website.new_page(browser)
     page.goto(f'{site.address}/valve/{valve}')
     page.wait_for_selector('.commission[data-verdict=limited] >> text=P1 is a constant')
     page.wait_for_selector('h1 >> text=LV-7')
@@ -247,7 +247,7 @@ def test_partial_strokes_are_asked_for_where_the_detector_allows_them(site, brow
 
 @pytest.mark.parametrize('scheme', ['light', 'dark'])
 def test_axe_finds_nothing_serious_on_any_page(site, hostile, browser, scheme):
-    page = browser.new_page(color_scheme=scheme)
+    page = website.new_page(browser, color_scheme=scheme)
     for address in ('/', '/valve/hostile/v1', '/history', '/replay', '/valve/none'):
         page.goto(site.address + address)
         page.wait_for_timeout(2000)
@@ -257,7 +257,7 @@ def test_axe_finds_nothing_serious_on_any_page(site, hostile, browser, scheme):
 
 def test_german_is_complete_on_the_page(site, browser):
     context = browser.new_context(locale='de-DE')
-    page = context.new_page()
+    page = website.new_page(context)
     page.goto(f'{site.address}/valve/mute')
     page.wait_for_selector('text=Die Reibung beträgt das 2,6-Fache des Normalen.')
     assert page.get_by_role('button', name='Alarm von mute quittieren').is_visible()
@@ -282,9 +282,9 @@ def test_a_thousand_valves_are_found_by_search_class_and_area_and_scroll(site, b
         status.header.stamp = site.voices.node.get_clock().now().to_msg()
         site.voices.say('/fleet/status', status)
         time.sleep(0.5)
-    page = browser.new_page(viewport={'width': 1440, 'height': 900})
+    page = website.new_page(browser, viewport={'width': 1440, 'height': 900})
     page.goto(site.address)
-    page.wait_for_function("document.querySelectorAll('.tile').length >= 1000", timeout=60_000)
+    page.wait_for_function("document.querySelectorAll('.tile').length >= 1000")
     page.get_by_role('searchbox').fill('V-0123')
     page.wait_for_function(
         "[...document.querySelectorAll('.item')].filter(i => !i.hidden).length === 1"
