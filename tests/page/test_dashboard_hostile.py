@@ -305,5 +305,6 @@ def test_a_thousand_valves_are_found_by_search_class_and_area_and_scroll(site, b
           requestAnimationFrame(step); })"""
     )
     print(f'1000 tiles: {frames:.0f} frames a second while scrolling')
-    assert frames > 3.0, 'others may load the machine, and there is no graphics card'
+    # there is no graphics card, and others may load the machine
+    assert frames > max(3.0 / promised(1.0), 0.5)
     page.close()
