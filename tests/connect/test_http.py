@@ -134,6 +134,11 @@ def test_json_events_actions_and_metrics_of_an_alarm(served):
     assert mine == ['alarm']
     schema = client.get('/openapi.json').json()
     assert '/api/acknowledge/{valve}' in schema['paths']
+    page = client.get('/docs').text
+    for path in schema['paths']:
+        assert f'<code>{path}</code>' in page
+    assert '<td>number of the alarm, 0: the present (body)</td>' in page
+    assert '//' not in page and '<script' not in page, 'a plant has no other machines to ask'
 
 
 def test_roles_and_foreign_pages(served):

@@ -9,10 +9,11 @@ from damadics_fd.store.access import Grant
 from damadics_fd.web.limits import SizeLimit
 from fastapi import Depends, FastAPI, HTTPException, Query, Request, Response
 from fastapi.exceptions import RequestValidationError
-from fastapi.responses import JSONResponse, StreamingResponse
+from fastapi.responses import HTMLResponse, JSONResponse, StreamingResponse
 from pydantic import BaseModel, ConfigDict, Field
 
 from damadics_connect.actions import LONGEST_SHELF, Actions
+from damadics_connect.http.docs_page import docs_page
 from damadics_connect.http.guard import Guard
 from damadics_connect.http.metrics import exposition
 from damadics_connect.http.stream import Stream
@@ -66,6 +67,8 @@ def application(watch: Watch, actions: Actions, stream: Stream, guard: Guard) ->
         summary='Judgements of control valves. Advisory only.',
         description='Stamps are nanoseconds; what is not known is null; silence is not health: '
         'a valve whose state is not_monitored is not judged.',
+        docs_url=None,  # those of the library load their scripts from other machines
+        redoc_url=None,
     )
     viewer = Depends(guard.viewer)
     operator = Annotated[Grant, Depends(guard.operator)]
@@ -80,6 +83,10 @@ def application(watch: Watch, actions: Actions, stream: Stream, guard: Guard) ->
             for error in problem.errors()[:5]
         ]
         return JSONResponse({'detail': '; '.join(wrong)}, 422)
+
+    @app.get('/docs', include_in_schema=False)
+    def docs() -> HTMLResponse:
+        return HTMLResponse(docs_page(app.openapi()))
 
     @app.get('/api/fleet', dependencies=[viewer])
     def fleet() -> list[Row]:
