@@ -112,10 +112,11 @@ class DetectorNode(MonitoringNode):
         self._encode = Encoder()
         self._flag = FaultFlag()
         self._flag.header.frame_id = self.actuator
-        self._residual = made.publisher(Float64Stamped, 'residual', qos.SAMPLES)
-        self._threshold = made.publisher(Float64Stamped, 'threshold', qos.SAMPLES)
-        self._residual_heard = self._residual.handle.get_subscription_count
-        self._threshold_heard = self._threshold.handle.get_subscription_count
+        on_request = made.publisher_on_request
+        self._residual, self._residual_heard = on_request(Float64Stamped, 'residual', qos.SAMPLES)
+        self._threshold, self._threshold_heard = on_request(
+            Float64Stamped, 'threshold', qos.SAMPLES
+        )
         self._fault_flag = made.publisher(FaultFlag, 'fault_flag', qos.FLAG)
         self._fault_event = made.publisher(FaultEvent, 'fault_event', qos.EVENTS)
         self._isolation = made.publisher(Isolation, 'isolation', qos.FLAG)
@@ -151,9 +152,8 @@ class DetectorNode(MonitoringNode):
         hear = self.entities.contained('isolation', self._hear)
         judged = self.entities.contained('estimate', self._judged_beside)
         self._taker = Taker(take, hear, self, judged)
-        takers = self._joints.at(self.resolve_topic_name('estimate')).takers
-        takers.append(self._taker)
-        self.entities.on_release(lambda: takers.remove(self._taker))
+        joint = self._joints.at(self.resolve_topic_name('estimate'))
+        self.entities.on_release(joint.join(self._taker))
         if self.settings.mode == 'scada':  # there the estimator knows the cause
             self.entities.subscription(
                 Isolation,
@@ -215,14 +215,20 @@ class DetectorNode(MonitoringNode):
         self.watch.heard_beside(self._taker.watch)
         self._judged += 1
         self.last, self._unread = stamp, True
-        if tag != self._tag:
-            self._strokes.follow(self._core.estimate, tag)
-        self._publish(tag, bool(news & SHOWN))
-        if news & HAPPENED:
-            self._happened(tag)
+        moved = tag != self._tag
+        if (
+            news
+            or moved
+            or self._was_silent
+            or self._residual_heard.count
+            or self._threshold_heard.count
+        ):
+            self._publish(tag, bool(news & SHOWN))
+            if news & HAPPENED:
+                self._happened(tag)
         if news & SIGNED or self._signature.due(stamp):
             self._signature.update(stamp, tag)
-        if self._strokes.under_way:
+        if moved or self._strokes.under_way:
             self._strokes.follow(self._core.estimate, tag)
 
     @property
@@ -245,9 +251,9 @@ class DetectorNode(MonitoringNode):
         """Publish residual and threshold to who listens, and the flag where it has changed."""
         if self._tag != tag:
             self._tag = self._flag.header.frame_id = tag
-        if self._residual_heard() and (decision := self._decision):
+        if self._residual_heard.count and (decision := self._decision):
             self._residual.publish(self._encode(decision.stamp, tag, decision.residual))
-        if self._threshold_heard() and (decision := self._decision):
+        if self._threshold_heard.count and (decision := self._decision):
             self._threshold.publish(self._encode(decision.stamp, tag, decision.threshold))
         turned = self._was_silent and self._look()
         if changed and not turned:

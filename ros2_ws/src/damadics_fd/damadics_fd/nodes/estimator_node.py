@@ -85,8 +85,9 @@ class EstimatorNode(MonitoringNode):
         self._last, self._phase = self._core.phase, -1
         self._refused_at = -math.inf  # monotonic time of the last refused sample [s]
         self._frozen = FrozenPosition()
-        self._publisher = made.publisher(EstimateMessage, 'estimate', qos.SAMPLES)
-        self._heard = self._publisher.handle.get_subscription_count
+        self._publisher, self._listeners = made.publisher_on_request(
+            EstimateMessage, 'estimate', qos.SAMPLES
+        )
         self._judgement: Judgement | None = None
         if self._core.stride:
             self._isolation = made.publisher(Isolation, 'isolation', qos.FLAG)
@@ -130,16 +131,16 @@ class EstimatorNode(MonitoringNode):
         self, sample: Sample, tag: str, taker: Taker, beside: Beside
     ) -> Estimate | Refused | None:
         """Let the only detector judge what is ordinary with the sample; None where it was."""
-        core = self._core
+        core, paired = self._core, self._pair
         if not isinstance(core, Estimator):
             return core.update(*sample)
-        if self._pair is None or self._pair[0] is not taker:
-            self._pair = taker, Pair(core, beside.core)
+        if paired is None or paired[0] is not taker:
+            paired = self._pair = taker, Pair(core, beside.core)
             taker.watch = self.watch
-        phase = self._phase if self._phase == beside.phase else -1
-        news = self._pair[1].take(sample, phase, beside.last)
+        phase = self._phase
+        news = paired[1].take(sample, phase if phase == beside.phase else -1, beside.last)
         if news >= 0:
-            if self._heard() > 1:
+            if self._listeners.count > 1:
                 taker.sent(sample.stamp)
                 self._publisher.publish(self._encoder.encode(core.latest, tag))
             taker.judged(sample.stamp, tag, news)
@@ -151,7 +152,7 @@ class EstimatorNode(MonitoringNode):
     def _give(self, estimate: Estimate, tag: str) -> None:
         """Hand an estimate to the detector beside, and publish it for whoever else listens."""
         takers = self._joint.takers
-        if not takers or self._heard() > len(takers):
+        if not takers or self._listeners.count > len(takers):
             for taker in takers:
                 taker.sent(estimate.stamp)
             self._publisher.publish(self._encoder.encode(estimate, tag))

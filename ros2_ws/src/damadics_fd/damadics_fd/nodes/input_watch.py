@@ -106,6 +106,10 @@ class InputWatch:
                 self._ros = self._clock.now().nanoseconds
             if tag != self._tag:
                 self._tag = plain(tag, NAME)
+            if jumps.passes(item.stamp, now):
+                fresh(item.stamp, now)
+                take(item, self._tag)
+                return
             for admitted in jumps.admit(item.stamp, item, now):
                 fresh(admitted.stamp, now)
                 take(admitted, self._tag)

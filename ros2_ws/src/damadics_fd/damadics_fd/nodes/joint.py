@@ -80,11 +80,26 @@ class Joint:
 
     def __init__(self) -> None:
         self.takers: list[Taker] = []
+        self.only: Taker | None = None  # where there is one
 
-    @property
-    def only(self) -> Taker | None:
-        """The detector, where there is one."""
-        return self.takers[0] if len(self.takers) == 1 else None
+    def join(self, taker: Taker) -> Callable[[], None]:
+        """
+        Add a detector.
+
+        :param taker: it.
+        :return: takes it away again.
+        """
+
+        def leave() -> None:
+            self.takers.remove(taker)
+            self._count()
+
+        self.takers.append(taker)
+        self._count()
+        return leave
+
+    def _count(self) -> None:
+        self.only = self.takers[0] if len(self.takers) == 1 else None
 
     def hand(self, estimate: Estimate, tag: str) -> None:
         """

@@ -5,11 +5,11 @@
 import math
 from typing import Generic, TypeVar
 
-from damadics_fd.core.stamps import SECOND, is_date
+from damadics_fd.core.stamps import DATE, SECOND, is_date
 
 LEAST_MAX_AGE = 2.0  # s
 PERIODS = 3.0  # sample periods; slower samples are that old by nature
-BACK = 1.0  # s that stamps may be out of order without being another run
+BACK = SECOND  # ns that stamps may be out of order without being another run
 INTERRUPTED = 0.3  # s without a sample, after which a source of simulated stamps may have paused
 MISSED = 2.5  # of the usual time between two samples, where these are slower
 WINDOW = 2.0  # s; two of them with the same delay after it say that it has
@@ -64,19 +64,20 @@ class Freshness:
         """
         before, self._stamp = self._stamp, stamp
         delay = steady - stamp / SECOND
-        if before is None or stamp < before - BACK * SECOND or is_date(before) != is_date(stamp):
+        if before is None or stamp < before - BACK or (abs(before) < DATE) != (abs(stamp) < DATE):
             self._least = delay
             self._pause = 0.0
         else:
             gap, known = steady - self._steady, self._usual < math.inf
-            if gap > max(INTERRUPTED, MISSED * self._usual if known else 0.0):
+            if gap > INTERRUPTED and not (known and gap <= MISSED * self._usual):
                 self._pause += max(delay - self._delay, 0.0)
                 self._begin_window(steady, math.inf)
             elif known:
                 self._usual += 0.2 * (gap - self._usual)
             if not known:
                 self._usual = gap
-        self._least = min(self._least, delay)
+        if delay < self._least:
+            self._least = delay
         self._delay, self._steady = delay, steady
         if self._pause > 0.0:
             self._lowest = min(self._lowest, delay)
@@ -121,6 +122,20 @@ class ForwardJumps(Generic[Item]):
     def holds(self) -> int:
         """Number of samples that wait for others to agree."""
         return len(self._held)
+
+    def passes(self, stamp: int, steady: float) -> bool:
+        """
+        Take the stamp of a sample that nothing is odd about, as nearly always.
+
+        :param stamp: of its measurement [ns].
+        :param steady: time of a clock that is never set [s].
+        :return: False where `admit` has to take the sample.
+        """
+        last = self._last
+        if last is None or self._held or stamp - last > (steady - self._steady + JUMP) * SECOND:
+            return False
+        self._last, self._steady = stamp, steady
+        return True
 
     def admit(self, stamp: int, item: Item, steady: float) -> list[Item]:
         """

@@ -3,6 +3,7 @@
 """The age of a judgement by its stamp, and stamps that jump ahead (TI-5, TI-9)."""
 
 import math
+import random
 
 import numpy as np
 import pytest
@@ -154,3 +155,17 @@ def test_wild_stamps_are_refused_each():
         assert jumps.admit(n * 10**6 * SECOND, n, n / 200) == []
     assert jumps.admit(SECOND + PERIOD, 50, 0.3) == [50]
     assert jumps.refused == 49
+
+
+@pytest.mark.parametrize('seed', range(20))
+def test_the_short_way_lets_the_same_stamps_through(seed):
+    rng = random.Random(seed)
+    short, whole = ForwardJumps(), ForwardJumps()
+    stamp, now = 0, 0.0
+    for item in range(400):
+        now += rng.choice((0.01, 0.01, 1.0, 100.0))
+        stamp += rng.choice((10**7, 10**7, 10**9, -(10**9), 70 * SECOND, 10**12))
+        passed = [item] if short.passes(stamp, now) else short.admit(stamp, item, now)
+        assert passed == whole.admit(stamp, item, now)
+        assert (short.refused, short.holds) == (whole.refused, whole.holds)
+    assert whole.refused

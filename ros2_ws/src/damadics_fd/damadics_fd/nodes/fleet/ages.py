@@ -55,7 +55,7 @@ class Ages:
         v = np.flatnonzero(newest >= 0)
         now = newest[v]
         before, delay, gap = self._stamp[v], steady - now / SECOND, steady - self._steady[v]
-        first = (before < 0) | (now < before - int(BACK * SECOND))
+        first = (before < 0) | (now < before - BACK)
         first |= (before >= DATE) != (now >= DATE)  # another run: its stamps begin anew
         usual = self._usual[v]
         if self._even and not (first | (gap > np.maximum(INTERRUPTED, MISSED * usual))).any():
