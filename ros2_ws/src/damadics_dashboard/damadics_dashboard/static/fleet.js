@@ -54,6 +54,8 @@
     parts.age = make('b', '', fresh);
     item.addEventListener('contentvisibilityautostatechange', (event) => {
       parts.age.away = event.skipped;
+      const tile = tiles.get(name);
+      if (tile && !event.skipped) { draw(tile); tell(tile); }
     });
     link.dataset.valve = name;
     return parts;
@@ -63,6 +65,7 @@
     if (element.textContent !== text) element.textContent = text;
   };
 
+  // Thousands of tiles are out of sight: what only the eye sees of them is drawn when it is seen.
   function show(name, told) {
     let tile = tiles.get(name);
     if (!tile) {
@@ -71,11 +74,22 @@
     }
     tile.told = told;
     tile.text = `${told.title} ${told.tag} ${told.state} ${told.why}`.toLowerCase();
-    const p = tile.parts;
-    p.link.className = `tile ${told.kind}`;
-    p.link.dataset.kind = told.kind;
-    p.link.setAttribute('href', told.address);
-    p.link.setAttribute('aria-label', told.label);
+    const { link } = tile.parts;
+    if (link.dataset.kind !== told.kind) {
+      link.className = `tile ${told.kind}`;
+      link.dataset.kind = told.kind;
+    }
+    if (link.getAttribute('href') !== told.address) link.setAttribute('href', told.address);
+    if (link.getAttribute('aria-label') !== told.label) link.setAttribute('aria-label', told.label);
+    tile.drawn = false;
+    if (!tile.parts.age.away) draw(tile);
+    place(name, tile);
+  }
+
+  function draw(tile) {
+    if (tile.drawn) return;
+    tile.drawn = true;
+    const { told, parts: p } = tile;
     p.sign.place.className = `ne ${told.kind}`;
     p.sign.use.setAttribute('href', `#ne-${told.kind}`);
     put(p.title, told.title);
@@ -91,7 +105,16 @@
     p.fill.style.width = `${(100 * share).toFixed(1)}%`;
     p.fill.parentElement.classList.toggle('progress', told.progress >= 0);
     p.fill.classList.toggle('over', told.progress < 0 && told.share > 1);
-    place(name, tile);
+  }
+
+  function tell(tile) {
+    if (tile.age === undefined) return;
+    const { age } = tile.parts;
+    if (tile.age === null) put(age, tile.told.never);
+    else {
+      age.dataset.age = String(tile.age + (performance.now() - tile.agedAt) / 1000);
+      age.told = undefined;
+    }
   }
 
   function place(name, tile) {
@@ -171,10 +194,11 @@
     message.ages.forEach((age, n) => {
       const tile = tiles.get(order[n]);
       if (!tile) return;
-      if (age === null) put(tile.parts.age, tile.told.never);
-      else { tile.parts.age.dataset.age = String(age); tile.parts.age.told = undefined; }
+      tile.age = age;
+      tile.agedAt = performance.now();
+      if (!tile.parts.age.away) tell(tile);
     });
-    sift();
+    if (message.order || Object.keys(message.tiles).length) sift();
     window.damadics.fleets = (window.damadics.fleets || 0) + 1;
   }
 
