@@ -40,6 +40,9 @@ from damadics_fd.core.signature.sliding import STICKING
 BLOCK = 0.1  # s
 SAME_LAG = 0.003  # s
 NO_LAG = 0.9  # of the misfit with a lag: without it less is left, of other blocks though
+STICKY_SHARE = 0.5  # of blocks that stick and slip, from which strokes tell no lag
+STICKY_LAGS = (0.03, 0.05, 0.08, 0.13, 0.2)  # s
+CLEARLY = 0.75  # of what is left without a lag
 LEAST = 20  # moving blocks each way
 MODEL_ERROR = 1e-3  # of the spring force over the stroke: the balance is no better than that
 WIDE, NARROW = (0.5, 0.2), (0.05, 0.03)  # prior of the plug force: in common, per node
@@ -125,8 +128,34 @@ def find_balance(
         without = replace(lag, seconds=0.0)
         none = _with_lag(signals, s, without, sheet, given, undetermined, lag.seconds)
         if none.misfit < NO_LAG * balance.misfit:
-            return _with_lag(signals, s, without, sheet, given, undetermined)
+            lag, balance = without, _with_lag(signals, s, without, sheet, given, undetermined)
+    if lag.seconds == 0.0 and float(np.mean(balance.sticky)) > STICKY_SHARE:
+        return _lag_by_blocks(signals, s, balance, sheet, given, undetermined)
     return balance
+
+
+def _lag_by_blocks(
+    signals: Signals,
+    s: Settings,
+    none: Balance,
+    sheet: Settings,
+    given: Collection[str],
+    undetermined: list[str],
+) -> Balance:
+    """Return the balance with the lag that leaves least, if that is clearly less than none."""
+
+    def left(b: Balance) -> float:
+        w = trust(b.v, b.sticky)
+        return float(np.sqrt(np.sum(w * (b.force - b.fitted) ** 2) / np.sum(w)))
+
+    found = {0.0: none}
+    for T in STICKY_LAGS:
+        lag = replace(none.lag, seconds=T, std=0.2 * T)
+        found[T] = _with_lag(signals, s, lag, sheet, given, undetermined, STICKY_LAGS[-1])
+    best = min(found, key=lambda T: left(found[T]))
+    if best == 0.0 or left(found[best]) > CLEARLY * left(none):
+        return none
+    return _with_lag(signals, s, found[best].lag, sheet, given, undetermined)
 
 
 def _with_lag(
@@ -263,8 +292,13 @@ def _final(
             'check area, stroke and the units of the pressures'
         )
     model = A[:, [K, ONE, V, S]]
+    unseen = max(-viscous / K_, 0.0)  # nothing but a lag that was not found rubs less than nothing
     viscous = max(viscous, 0.0)
-    settings = s.replace(stiffness=float(f'{K_:.5g}'), preload=float(f'{max(preload, 0.0):.4g}'))
+    settings = s.replace(
+        stiffness=float(f'{K_:.5g}'),
+        preload=float(f'{max(preload, 0.0):.4g}'),
+        ps_lag_std=min(max(s.ps_lag_std, float(f'{unseen:.2g}')), 1.0),
+    )
     sensors = float(np.std(np.diff(fit.left)[np.diff(b.index[use]) == 1])) / np.sqrt(2.0)
     names = list(undetermined)
     if plugged and float(np.std(b.dp[use])) < 1e-3 * max(float(np.mean(np.abs(b.dp[use]))), 1.0):

@@ -165,12 +165,13 @@ class _Scan:
             self.precision = full
         matrix = np.stack(columns, axis=1)
         length = max(run.stop - run.start for run in runs)
+        sticky = b.sticky
         self.R = np.zeros((len(runs), length, matrix.shape[1]))
         self.y, self.weight = np.zeros((2, len(runs), length))
         for k, run in enumerate(runs):
             n = run.stop - run.start
             self.R[k, :n], self.y[k, :n] = matrix[run], s.area * b.ps[run]
-            self.weight[k, :n] = trust(v[run])
+            self.weight[k, :n] = trust(v[run], sticky[run])
         self.rows = int(self.weight.sum()) - len(runs)
         self.width = b.width
         self.floating = _sensor_noise(b, s, runs, gain)
