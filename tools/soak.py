@@ -186,13 +186,17 @@ def main() -> int:
     """
     p = argparse.ArgumentParser(prog='soak', description=__doc__.split('\n')[1])
     p.add_argument('--minutes', type=float, default=60.0, help='in real time (60)')
+    p.add_argument('--fast-minutes', type=float, default=30.0, help='faster (30)')
     p.add_argument(
-        '--fast-minutes', type=float, default=30.0, help=f'{FACTOR:g} times as fast (30)'
+        '--factor',
+        type=float,
+        default=FACTOR,
+        help=f'how much faster; {FACTOR:g} needs two quiet cores ({FACTOR:g})',
     )
     options = p.parse_args()
     found = []
     with tempfile.TemporaryDirectory() as folder:
-        for minutes, factor in ((options.minutes, 1.0), (options.fast_minutes, FACTOR)):
+        for minutes, factor in ((options.minutes, 1.0), (options.fast_minutes, options.factor)):
             if minutes > 0.0:
                 found += soak(Path(folder, f'x{factor:g}'), minutes, factor)
     print(json.dumps(found, indent=1))
