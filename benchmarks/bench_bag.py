@@ -108,9 +108,10 @@ def replaying(folder: Path) -> None:
     from damadics_fd.bag.recording import Recording
     from damadics_fd.commands.replay.bags import Plan, replay, warm_up
 
+    threads = loading.THREADS
     write_columns(folder / 'fast.mcap', recording(ROWS, PAPER))
     print(
-        f'\n{"whole replay":20}{"M samples/s and core":>22}{"day at 200 Hz":>16}'
+        f'\n{"whole replay":28}{"M samples/s and core":>22}{"day at 200 Hz":>16}'
         f'{"M samples/s, wall":>20}'
     )
     # mode paper takes each sample that is slower than its own rate in two steps
@@ -118,9 +119,11 @@ def replaying(folder: Path) -> None:
         source = Recording(folder / ('fast.mcap' if rate == PAPER else 'large.mcap'))
         warm_up([Plan(mode)])
         task = partial(replay, source, Plan(mode))
-        cpu, wall = ROWS / spent(task, 10)
-        name = f'{mode}, {rate:g} Hz'
-        print(f'{name:20}{cpu / 1e6:22.2f}{86400 * 200 / cpu:14.1f} s{wall / 1e6:20.2f}')
+        for number in sorted({1, threads}):
+            loading.THREADS = number
+            cpu, wall = ROWS / spent(task, 10)
+            name = f'{mode}, {rate:g} Hz, threads: {number}'
+            print(f'{name:28}{cpu / 1e6:22.2f}{86400 * 200 / cpu:14.1f} s{wall / 1e6:20.2f}')
 
 
 def memory(folder: Path) -> None:
