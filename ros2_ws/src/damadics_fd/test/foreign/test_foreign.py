@@ -105,6 +105,13 @@ def test_a_foreign_valve_is_watched_without_alarm_and_its_fault_named(change):
         assert np.isnan(t.size) or t.size == pytest.approx(t.true, rel=0.15)
 
 
+def test_a_balanced_trim_is_not_taken_for_noise():
+    build = kinds.random_valve(702, plug_gain=0.15)
+    proposal = commissioned(build, 702, minutes=10.0)
+    assert proposal.settings.rho_min < 2.0
+    assert proposal.result.estimator.monitoring
+
+
 def test_a_plug_that_the_flow_slams_shut_raises_no_alarm():
     build = kinds.random_valve(104, air_to='open', flow_to='close')
     proposal = commissioned(build, 104)

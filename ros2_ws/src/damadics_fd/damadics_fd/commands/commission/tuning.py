@@ -39,12 +39,14 @@ def tune(columns: Columns, balance: Balance, base: Settings) -> tuple[Settings, 
         g5=_digits(0.87 * pole),
         gw=_digits(33.0 * pole / (1.93 * (base.t_learn - base.t_w))),
     )
+    # the noise that is followed is times the plug coefficient, which a balanced trim has above 1
+    weight = max(scaled.plug_table[0], 1.0)
     for wn in BANDWIDTHS:
         scaled = scaled.replace(wn=wn)
         estimator = Estimator(scaled)
         Chain(scaled, estimator=estimator).run(columns)
         state = estimator.state[0]
-        noise = 1.4826 * float(state.noise) / pole
+        noise = 1.4826 * float(state.noise) / (pole * weight)
         if 4.0 * noise <= scaled.dz:
             break
     if 4.0 * noise > scaled.dz:
