@@ -47,7 +47,7 @@ QUIET, SHIFTED = 0.02, 0.005  # of the stroke: a stem that hardly moves shows no
 OFF = 1e9  # a limit that is never reached
 NEVER = 9.0  # a change of CV, which is 0..1, is never as large
 JUMPS = (0.05, 3.0)  # a jump of CV is more than this, and than this times the largest learned
-SWING = (0.35, 2.0)  # of the pressure drop, of the largest change learned
+SWING = (0.5, 2.0)  # of the pressure drop, of the largest change learned
 
 __all__ = ['LearningError', 'learn']
 
@@ -117,7 +117,8 @@ def learn(
     slow = slow_sigma(ref, settings, prediction, part)
     set_limits(ref, settings, values, sigma, slow, wandering)
     if ref.stem_kind == NOMINAL and prediction is not None:
-        friction_limit(ref, settings, values[:, R1], prediction.xm - prediction.xd, wandering)
+        xm, wider = prediction.xm, prediction.xm - prediction.xd
+        friction_limit(ref, settings, values[:, R1], xm, wider, wandering)
     else:
         ref.s1, ref.kap2, ref.llr_limit = sigma[R1], 1.0, OFF
     return reference

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from damadics_fd.core.scada.judging.cusum import R1, R2, TEST_NAMES, TESTS
 from damadics_fd.core.scada.judging.predict import STRANGE
-from damadics_fd.core.scada.judging.residuals import FLOW_DRIFT, STEM_DRIFT
+from damadics_fd.core.scada.judging.residuals import FLOW_TOLD, STEM_TOLD
 from damadics_fd.core.scada.judging.roughness import rougher
 from damadics_fd.core.scada.laws.actuator import F_RANGE, P_RANGE, T_RANGE, TPH_PER_KGS
 from damadics_fd.core.scada.learning import LearningError, learn
@@ -239,14 +239,14 @@ class ScadaMonitor:
         )
 
     def drifts(self) -> list[str]:
-        """Return what has drifted by more than half of what is followed, and noise that grew."""
+        """Return what has drifted so far that a person should know, and noise that grew."""
         if self.reference is None:
             return []
         stem, flow = (float(v) for v in self.state.drift)
         told = []
-        if abs(stem) > 0.5 * STEM_DRIFT:
+        if abs(stem) > STEM_TOLD:
             told.append(f'the stem has drifted by {100.0 * stem:+.1f} % of the stroke')
-        if abs(flow) > 0.5 * FLOW_DRIFT:
+        if abs(flow) > FLOW_TOLD:
             told.append(f'the flow has drifted by {100.0 * math.expm1(flow):+.0f} %')
         for name, r in (('stem', R1), ('flow', R2)):
             factor = float(rougher(self.state, self.reference[0], r, 1))

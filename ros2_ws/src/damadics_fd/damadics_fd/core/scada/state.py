@@ -111,6 +111,7 @@ class MonitorState(Record):
     stem: Annotated[Rows[StemState], 2]  # nominal, wide play
     track: StemTrack
     xs: float  # slow copy of the stem law
+    xq: float  # quick copy
     last: Annotated[Floats, 3, 5]  # CV, X, P1, P2, F of this sample and the two before
     repeats: int  # samples in a row that are the one before
     size: float
@@ -159,6 +160,9 @@ class MonitorState(Record):
     rough_size: Annotated[Ints, N_ROUGH]
     g: Annotated[Floats, N_TESTS, 2]
     zero: Annotated[Floats, N_TESTS, 2]  # when g was last zero: estimate of the onset
+    anchor: float  # where the stem moved to last, and samples since then
+    rest: int
+    lasting: float  # of r1 of a law, no evidence where it lasts
     llr: float
     llr_zero: float
     ratio: float  # largest statistic / limit

@@ -5,6 +5,8 @@
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 R1, R2, P1, P2, T1, PROCESS = range(6)
 RESIDUALS = ('r1', 'r2', 'p1', 'p2', 't1', 'process')
 NO_CLIP = 1e9
@@ -60,6 +62,8 @@ TESTS = (
     Cusum(PROCESS, 0.5, 1, 1.0, 0.0, 1.0),
 )
 FRICTION_TEST = len(TESTS)
+QUICK = 0.5  # allowance of a test that is not slow
+TEST_RESIDUAL = np.array([test.residual for test in TESTS])
 TEST_NAMES = (*(test.name for test in TESTS), 'friction LLR')
 
 

@@ -7,17 +7,18 @@ import math
 import numpy as np
 
 from damadics_fd.core.jit import jit
-from damadics_fd.core.scada.judging.cusum import FRICTION_TEST, R1, R2, TESTS
+from damadics_fd.core.scada.judging.cusum import FRICTION_TEST, QUICK, R1, R2, TEST_RESIDUAL, TESTS
 from damadics_fd.core.scada.judging.roughness import rougher
+from damadics_fd.core.scada.laws.stem_law import shrink
 from damadics_fd.core.scada.state import LAW, N_RESIDUALS, N_TESTS, MonitorState, Reference
 
 LLR_CLIP = 8.0
-TEST_RESIDUAL = np.array([test.residual for test in TESTS])
+MOTION = 0.003  # of the stroke: the stem has moved
+SHOWN = 60  # samples after a motion that show its friction
 SCALES = np.array([2 if test.block >= 30 else 1 for test in TESTS])  # of the roughness
 # Multiples of its limit beyond which a statistic does not grow, so that it comes back in time
 # after the fault: by how quick the test is.
 CAPS = (3.0, 1.2, 1.05)
-QUICK = 0.5  # allowance of a test that is not slow
 ONE_SAMPLE = 0.8  # of a limit, the most that a single sample brings
 JUMP = 6.0  # sigma from one sample to the next that may be a spike
 RETURNED = 0.3  # of a jump, by which the value may still be off when it has come back
@@ -104,6 +105,8 @@ def decide(s: MonitorState, ref: Reference) -> None:
         if s.testable[r] > 0:
             if law and s.inside == 0 and ref.k[i] < QUICK:
                 value = ref.mu[i]  # slow tests of a law believe it only where it was learned
+            if law and r == R1 and ref.k[i] <= QUICK:
+                value = shrink(value, s.lasting)
             z = (value - ref.mu[i]) / (ref.sd[i] * rougher(s, ref, r, SCALES[i]))
             z = min(max(z, -ref.clip[i]), ref.clip[i])
             k = ref.k[i]
@@ -166,9 +169,26 @@ def note_evidence(s: MonitorState) -> None:
 
 
 @jit
+def rests(x: float, anchor: float, rest: int) -> int:
+    """
+    Return the samples since the stem has moved.
+
+    A stem at rest shows the same distance between the two models again and again: an hour of it
+    tells as little of the play as a minute.
+
+    >>> rests(0.51, 0.5, 7), rests(0.501, 0.5, 7)
+    (0, 8)
+    """
+    return 0 if abs(x - anchor) > MOTION else rest + 1
+
+
+@jit
 def test_friction(s: MonitorState, ref: Reference) -> None:
     """Compare the model with a copy of three times the play by their likelihoods."""
-    if s.testable[R1] > 0:
+    s.rest = rests(s.xm[0], s.anchor, s.rest)
+    if s.rest == 0:
+        s.anchor = s.xm[0]
+    if s.testable[R1] > 0 and s.rest < SHOWN:
         s1 = ref.s1 * rougher(s, ref, R1, 1)
         z1 = s.residual[R1] / s1
         z1d = (s.residual[R1] + s.xm[0] - s.xd) / s1

@@ -9,7 +9,7 @@ import numpy as np
 
 from damadics_fd.core.jit import jit
 from damadics_fd.core.scada.judging.cusum import PROCESS, R1, R2, TESTS, siegmund_limit
-from damadics_fd.core.scada.judging.decide import LLR_CLIP
+from damadics_fd.core.scada.judging.decide import LLR_CLIP, SHOWN, rests
 from damadics_fd.core.scada.laws.robust import Floats, block_spread, spread_of
 from damadics_fd.core.scada.settings import ScadaSettings
 from damadics_fd.core.scada.state import LAW, Reference
@@ -54,6 +54,20 @@ def _llr_maximum(gain: np.ndarray) -> float:
         g = max(0.0, g + min(max(value, -LLR_CLIP), LLR_CLIP))
         largest = max(largest, g)
     return largest
+
+
+@jit
+def _moved(model: np.ndarray) -> np.ndarray:
+    """Tell which samples of a record show the friction of the stem."""
+    moved = np.empty(model.size, np.bool_)
+    anchor = 0.0
+    rest = 0
+    for i in range(model.size):
+        rest = rests(model[i], anchor, rest)
+        if rest == 0:
+            anchor = model[i]
+        moved[i] = rest < SHOWN
+    return moved
 
 
 def block_sigma(values: Floats, length: int) -> float:
@@ -166,7 +180,12 @@ def _of_law(ref: Reference, i: int, r: Floats, sigma: float, arl: float) -> None
 
 
 def friction_limit(
-    ref: Reference, settings: ScadaSettings, r1: Floats, wider: Floats, wandering: bool
+    ref: Reference,
+    settings: ScadaSettings,
+    r1: Floats,
+    model: Floats,
+    wider: Floats,
+    wandering: bool,
 ) -> None:
     """
     Set the limit of the likelihood-ratio test for friction.
@@ -174,7 +193,8 @@ def friction_limit(
     :param ref: record of `REFERENCE`, written.
     :param settings: budget.
     :param r1: stem residual, NaN where not testable.
-    :param wider: position of the model less that of the copy with the wider play.
+    :param model: position of the model.
+    :param wider: the same less that of the copy with the wider play.
     :param wandering: the inputs have no constant mean.
     """
     ok = np.isfinite(r1)
@@ -183,6 +203,7 @@ def friction_limit(
     kap2 = max(1.0, (block_sigma(inliers(r), 5) / s1) ** 2)
     wide = (r + wide_by) / s1
     gain = ((r / s1) ** 2 - wide**2) / (2.0 * kap2)
+    gain[~_moved(model)[ok]] = 0.0
     ref.s1, ref.kap2 = s1, kap2
     arl = arl_per_test(settings, max(settings.period_s, float(ref.period)))
     ref.llr_limit = max(LLR_MARGINS[wandering] * math.log(arl), LLR_HEAD_ROOM * _llr_maximum(gain))

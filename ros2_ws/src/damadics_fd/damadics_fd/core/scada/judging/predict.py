@@ -175,6 +175,7 @@ def predict(
     if law:
         s.xm[0] = position(s.track, ref.stem_law, 0)
         s.xs = position(s.track, ref.stem_law, 1)
+        s.xq = position(s.track, ref.stem_law, 2)
         s.xd = s.xm[0]
     elif s.filled > 0:
         dt = t - t0
@@ -197,6 +198,7 @@ def predict(
             s.stem[1], cfg.act, s.fault[1], t0, t, s.cv[1], cv1, z1, z0, slope0, slope1
         )
         s.xs = s.xm[0]
+        s.xq = s.xm[0]
         entry.cv = cv1
     s.filled += 1
     xm = s.xm[0]

@@ -5,12 +5,19 @@
 import math
 
 from damadics_fd.core.jit import jit
-from damadics_fd.core.scada.judging.cusum import P1, P2, PROCESS, R1, R2, T1
+from damadics_fd.core.scada.judging.cusum import P1, P2, PROCESS, QUICK, R1, R2, T1, TEST_RESIDUAL
 from damadics_fd.core.scada.judging.predict import repeated
 from damadics_fd.core.scada.judging.roughness import follow_roughness
 from damadics_fd.core.scada.laws.flow_law import flow_doubt, slope
-from damadics_fd.core.scada.laws.stem_law import outside, stem_doubt, transient_doubt
-from damadics_fd.core.scada.state import HISTORY_LENGTH, LAW, N_WEIGHTS, MonitorState, Reference
+from damadics_fd.core.scada.laws.stem_law import outside, shrink, stem_doubt, transient_doubt
+from damadics_fd.core.scada.state import (
+    HISTORY_LENGTH,
+    LAW,
+    N_TESTS,
+    N_WEIGHTS,
+    MonitorState,
+    Reference,
+)
 
 DOUBT = 3.0  # standard deviations of a law that are no evidence
 X = 2  # place of the position among the signals
@@ -21,12 +28,16 @@ STOP_DOUBT = 0.05  # of the stroke, at a stop and for a while after it has left
 STOP_S = 60.0
 # What a quarter of an hour does not show and a day does: how a plant changes over hours.
 HOURS_S = 10800.0
-STEM_HOURS = 0.002  # standard deviation, share of stroke
+STEM_HOURS = 0.0015  # standard deviation, share of stroke, for tests of what lasts some seconds
+STEM_LASTING = 0.0005  # and in addition for tests of what lasts for minutes
 FLOW_HOURS = 0.05  # share of the flow
-DRIFT_S = 2.0 * 3600.0  # so slowly a drift is followed
-STEM_DRIFT = 0.01  # of the stroke
+FIRST = 0.1  # share of the next two while no test is made: a record may begin elsewhere
+STEM_DRIFT_S = 600.0  # so slowly a drift is followed: of the stem
+FLOW_DRIFT_S = 1800.0  # of the flow
+STEM_DRIFT = 0.02  # of the stroke
 FLOW_DRIFT = 0.1  # of log F
-CALM = 0.5  # of a limit: nothing speaks of a fault
+STEM_TOLD, FLOW_TOLD = 0.005, 0.05  # drifts that are told
+CALM = 0.5  # of a limit of a quick test: nothing speaks of a fault
 END = 0.985  # of the meter's range: it shows no more
 AT_END, LEAST_END = 4.0, 0.9  # deviations of its noise below that, but not below this share
 SEAT = 0.03  # of the stroke, so near to its seat a plug throttles as it likes
@@ -45,17 +56,6 @@ def hours_unseen(ref: Reference) -> float:
 
 
 @jit
-def shrink(value: float, allowance: float) -> float:
-    """
-    Return what of a residual lies beyond an allowance.
-
-    >>> shrink(0.5, 0.2), shrink(-0.1, 0.2)
-    (0.3, 0.0)
-    """
-    return math.copysign(max(abs(value) - allowance, 0.0), value)
-
-
-@jit
 def residuals(
     s: MonitorState, ref: Reference, x: float, p1: float, p2: float, t1: float, flow: float
 ) -> None:
@@ -66,12 +66,13 @@ def residuals(
     correction = 0.0
     xm = s.xm[0]
     if ref.stem_kind == LAW:
-        raw = outside(x - s.drift[0], xm, s.xs)
-        follow_drift(s, 0, x - xm, STEM_DRIFT, 2.0 * ref.s1)
+        raw = outside(x - s.drift[0], xm, s.xs, s.xq)
+        follow_drift(s, ref, 0, x - xm, STEM_DRIFT, 2.0 * ref.s1, STEM_DRIFT_S)
         doubt = DOUBT * stem_doubt(ref.stem_law, xm) + DOUBT * STEM_HOURS * hours_unseen(ref)
         doubt += transient_doubt(s.track, ref.stem_law)
         beyond = max(ref.low[X] - xm, xm - ref.high[X], 0.0)
         doubt += (abs(ref.stem_law.gain - 1.0) + BENT) * beyond
+        s.lasting = DOUBT * STEM_LASTING * hours_unseen(ref)
         s.lever[0] = 1.0
     else:
         for i in range(N_WEIGHTS):
@@ -101,19 +102,40 @@ def residuals(
 
 
 @jit
-def follow_drift(s: MonitorState, which: int, error: float, limit: float, step: float) -> None:
+def speaks(s: MonitorState, ref: Reference, residual: int) -> bool:
+    """Tell whether a residual speaks of a fault: a quick test begins to, or a slow one does."""
+    for i in range(N_TESTS):
+        least = CALM if ref.k[i] >= QUICK else 1.0
+        if TEST_RESIDUAL[i] == residual and s.ratios[i] > least:
+            return True
+    return False
+
+
+@jit
+def follow_drift(
+    s: MonitorState,
+    ref: Reference,
+    which: int,
+    error: float,
+    limit: float,
+    step: float,
+    memory_s: float,
+) -> None:
     """
     Follow what a plant changes over hours, within a limit and while nothing speaks of a fault.
 
     :param which: 0 the stem, 1 the flow.
     :param error: measured less model, the drift not taken off.
     :param limit: largest drift that is followed; step: largest error that counts.
+    :param memory_s: how slowly it is followed, s.
     """
-    if s.stood or s.ratio > CALM or s.filled < 1:
+    if s.filled < 1 or speaks(s, ref, R1 if which == 0 else R2):
         return
     dt = s.t - s.history[(s.samples - 1) % HISTORY_LENGTH].t0
+    if s.t < s.t_test:
+        memory_s *= FIRST
     away = min(max(error - s.drift[which], -step), step)
-    moved = s.drift[which] + (1.0 - math.exp(-dt / DRIFT_S)) * away
+    moved = s.drift[which] + (1.0 - math.exp(-dt / memory_s)) * away
     s.drift[which] = min(max(moved, -limit), limit)
 
 
@@ -159,7 +181,8 @@ def flow_residual(s: MonitorState, ref: Reference, x: float, flow: float) -> flo
         if low < LEAST * scale * 1.5:
             low = -math.inf
     elif s.f > LEAST * scale:
-        follow_drift(s, 1, math.log(flow / s.f), FLOW_DRIFT, 2.0 * law.spread)
+        step = 2.0 * law.spread
+        follow_drift(s, ref, 1, math.log(flow / s.f), FLOW_DRIFT, step, FLOW_DRIFT_S)
     value = 0.0
     if flow > high:
         value = flow - high

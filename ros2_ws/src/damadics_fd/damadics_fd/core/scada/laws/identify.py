@@ -9,7 +9,13 @@ import numpy as np
 
 from damadics_fd.core.record import Plain
 from damadics_fd.core.scada.estimator import scada_settings
-from damadics_fd.core.scada.judging.residuals import DOUBT, FLOW_HOURS, HOURS_S, STEM_HOURS
+from damadics_fd.core.scada.judging.residuals import (
+    DOUBT,
+    FLOW_HOURS,
+    HOURS_S,
+    STEM_HOURS,
+    STEM_LASTING,
+)
 from damadics_fd.core.scada.laws.actuator import F_RANGE, P_RANGE
 from damadics_fd.core.scada.laws.clean import period_of
 from damadics_fd.core.scada.laws.flow_law import GAS
@@ -124,7 +130,7 @@ def _stem(reference: np.ndarray) -> list[str]:
     sigma = float(ref['sd'][1])
     least = 2.0 * sigma
     if ref['stem_kind'] == LAW:
-        least += DOUBT * STEM_HOURS * unseen(reference)
+        least += DOUBT * (STEM_HOURS + STEM_LASTING) * unseen(reference)
     return [
         f'stem: {kind}; dead time {law["dead_s"]:.1f} s, lag {law["lag_s"]:.1f} s, gain '
         f'{law["gain"]:.3f}' + ''.join(f', {text}' for text in rates),

@@ -4,9 +4,10 @@
 A stem as anyone's positioner moves it: dead time, first-order lag, rate limits, dead band.
 
 The law runs on CV alone and never looks at the measured position, so a stem that stands still or
-is off by a little shows for as long as it lasts. A second copy moves no faster than the law was
-seen to move while it was right: between the two lies what was not learned, and a stem that is
-found there is no evidence against the valve.
+is off by a little shows for as long as it lasts. A slow copy moves no faster than the law was seen
+to move while it was right; a quick one is held back less by the limits of the rates, which
+follow from the air supply of the day. Between the two lies what was not learned, and a stem that
+is found there is no evidence against the valve.
 """
 
 import math
@@ -21,11 +22,14 @@ DELAYS = 64  # samples of CV kept for the dead time
 FADE_LAGS, FADE_S = 3.0, 5.0  # how long a motion is remembered
 TRANSIENT = 0.08  # of the way still to go that a law knows no better
 FAST = 1e3  # a rate that limits nothing, 1/s
+QUICKER = 1.5  # multiples of a limit of its rate at which a stem may move on another day
+COPIES = 3  # law, slow copy, quick copy
 
 
 class StemLaw(Record):
     """What is known of a stem: how it follows CV, how far that was seen to hold."""
 
+    hold: bool  # CV is held between samples, as a control system sends it
     dead_s: float  # dead time of CV
     lag_s: float  # first-order lag
     rise: float  # fastest closing, stroke/s
@@ -52,8 +56,8 @@ class StemTrack(Record):
     cv: Annotated[Floats, DELAYS]
     ahead: float  # how far the law has still to go
     was_ahead: float  # the same, or a little while ago
-    lagged: Annotated[Floats, 2]  # after lag and rate: the law, its slow copy
-    held: Annotated[Floats, 2]  # after the dead band
+    lagged: Annotated[Floats, COPIES]  # after lag and rate: law, slow copy, quick copy
+    held: Annotated[Floats, COPIES]  # after the dead band
 
 
 STEM_TRACK = StemTrack.dtype()
@@ -106,16 +110,42 @@ def advance_track(s: StemTrack, law: StemLaw, t: float, cv: float) -> None:
     s.cv[i] = cv
     if dt <= 0.0:
         return
-    # the command in the middle of the interval stands for the interval
-    command = min(max(delayed(s, t - law.dead_s - 0.5 * min(dt, law.lag_s)), 0.0), 1.0)
+    if law.hold:
+        follow_held(s, law, t - law.dead_s, dt)
+    else:  # the command in the middle of the interval stands for the interval
+        follow(s, law, delayed(s, t - law.dead_s - 0.5 * min(dt, law.lag_s)), dt)
+
+
+@jit
+def follow_held(s: StemTrack, law: StemLaw, end: float, dt: float) -> None:
+    """Follow a CV that keeps its value until the next sample, over dt up to `end`."""
+    begin = end - dt
+    back = 0
+    while back < min(s.count, DELAYS - 1) and s.t[(s.count - back) % DELAYS] > begin:
+        back += 1
+    while back >= 0:
+        until = end if back == 0 else min(s.t[(s.count - back + 1) % DELAYS], end)
+        if until > begin:
+            follow(s, law, s.cv[(s.count - back) % DELAYS], until - begin)
+            begin = until
+        back -= 1
+
+
+@jit
+def follow(s: StemTrack, law: StemLaw, cv: float, dt: float) -> None:
+    """Follow one command for dt."""
+    command = min(max(cv, 0.0), 1.0)
     fade = math.exp(-dt / (FADE_LAGS * law.lag_s + FADE_S))
     s.ahead = abs(command - s.lagged[0])
     s.was_ahead = max(s.ahead, s.was_ahead * fade)
     share = 1.0 - math.exp(-dt / law.lag_s) if law.lag_s > 0.0 else 1.0
     half = 0.5 * law.band
-    for k in range(2):
+    for k in range(COPIES):
         rise = (law.slow_rise if k == 1 else law.rise) * dt
         fall = (law.slow_fall if k == 1 else law.fall) * dt
+        if k == 2:
+            rise *= QUICKER
+            fall *= QUICKER
         move = share * (command - s.lagged[k])
         s.lagged[k] += min(max(move, -fall), rise)
         s.held[k] = min(max(s.held[k], s.lagged[k] - half), s.lagged[k] + half)
@@ -123,22 +153,33 @@ def advance_track(s: StemTrack, law: StemLaw, t: float, cv: float) -> None:
 
 @jit
 def position(s: StemTrack, law: StemLaw, k: int) -> float:
-    """Return the position of the law (0) or of its slow copy (1), 0..1."""
+    """Return the position of the law (0), its slow copy (1) or its quick one (2), 0..1."""
     x: float = law.offset + law.gain * s.held[k]
     return min(max(x, 0.0), 1.0)
 
 
 @jit
-def outside(x: float, first: float, second: float) -> float:
+def outside(x: float, first: float, second: float, third: float) -> float:
     """
-    Return by how much x lies outside what two models span, 0 between them.
+    Return by how much x lies outside what three models span, 0 between them.
 
-    >>> outside(0.5, 0.2, 0.6), round(outside(0.7, 0.2, 0.6), 3), outside(0.1, 0.6, 0.2) < 0
-    (0.0, 0.1, True)
+    >>> outside(0.5, 0.3, 0.2, 0.6), round(outside(0.7, 0.2, 0.3, 0.6), 3)
+    (0.0, 0.1)
     """
-    low = min(first, second)
-    high = max(first, second)
+    low = min(first, second, third)
+    high = max(first, second, third)
     return x - high if x > high else min(x - low, 0.0)
+
+
+@jit
+def shrink(value: float, allowance: float) -> float:
+    """
+    Return what of a residual lies beyond an allowance.
+
+    >>> shrink(0.5, 0.2), shrink(-0.1, 0.2)
+    (0.3, 0.0)
+    """
+    return math.copysign(max(abs(value) - allowance, 0.0), value)
 
 
 @jit
@@ -160,15 +201,15 @@ def follow_record(
     law: np.ndarray, track: np.ndarray, t: np.ndarray, cv: np.ndarray, out: np.ndarray
 ) -> None:
     """
-    Run the law and its slow copy over a record.
+    Run the law and its copies over a record.
 
-    :param out: written, shape (n, 3): both with gain 1 and offset 0, and the way still to go.
+    :param out: written, shape (n, 4): all three with gain 1 and offset 0, and the way still to go.
     """
     s = track[0]
     p = law[0]
     start_track(s, t[0], cv[0])
     for i in range(t.size):
         advance_track(s, p, t[i], cv[i])
-        out[i, 0] = s.held[0]
-        out[i, 1] = s.held[1]
-        out[i, 2] = s.was_ahead
+        for k in range(COPIES):
+            out[i, k] = s.held[k]
+        out[i, COPIES] = s.was_ahead

@@ -1,0 +1,105 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Mode scada on a valve that is operated another way than the one that was learned."""
+
+import math
+
+import numpy as np
+import pytest
+from damadics_fd.core.scada.judging.cusum import TEST_NAMES
+from damadics_fd.core.scada.judging.decide import test_friction as weigh_friction
+from damadics_fd.core.scada.laws.fit_stem import Piece, fit_stem
+from damadics_fd.core.scada.learning import learn
+from damadics_fd.core.scada.monitor import ScadaMonitor
+from damadics_fd.core.scada.state import MONITOR, REFERENCE
+
+from .driven import NOISE, SETTINGS, driven, following
+
+T, CV, X, P1, P2, T1, F = range(7)
+FALL = 0.04  # of the stroke a second
+HOUR = 3600
+
+
+def limited(n: int, seed: int, fall: float = FALL) -> np.ndarray:
+    """Return rows of a stem that closes at once and opens slowly; CV is held for each second."""
+    rng = np.random.default_rng(seed)
+    cv = np.clip(0.6 + 0.06 * rng.normal(size=n), 0.0, 1.0)
+    x = np.empty(n)
+    at = x[0] = cv[0]
+    parts = 20
+    for k in range(1, n):
+        for part in range(parts):  # a quarter of a second late
+            command = cv[max(k - 2, 0)] if part < parts // 4 else cv[k - 1]
+            at = max(command, at - fall / parts)
+        x[k] = at
+    rows = np.full((n, 7), np.nan)
+    rows[:, T], rows[:, CV] = np.arange(float(n)), cv
+    rows[:, X] = x + rng.normal(0.0, NOISE, n)
+    return rows
+
+
+@pytest.fixture(scope='module')
+def followed():
+    """Learn a valve of which CV and position alone are measured."""
+    return learn(following(400, seed=2), SETTINGS, math.inf)
+
+
+def test_a_command_that_is_held_between_samples_is_seen_to_be():
+    rows = limited(600, seed=1)
+    fit = fit_stem([Piece(rows[:, T], rows[:, CV], rows[:, X])], 1.0)
+    law = fit.law[0]
+    assert law['hold']
+    assert law['fall'] == pytest.approx(FALL, rel=0.15)
+    assert fit.sigma < 0.006, 'a CV along straight lines leaves 0.014'
+
+
+def test_a_stem_with_more_air_than_on_the_learned_day_is_no_fault():
+    reference = learn(limited(600, seed=1), SETTINGS, math.inf)
+    monitor = ScadaMonitor(SETTINGS, reference)
+    assert not monitor.run_samples(limited(HOUR, seed=2, fall=1.4 * FALL))['alarm'].any()
+    stuck = limited(400, seed=3)
+    stuck[200:, X] = stuck[200, X]
+    trace = ScadaMonitor(SETTINGS, reference).run_samples(stuck)
+    assert 200 <= trace['t'][trace['alarm']][0] <= 230
+
+
+@pytest.mark.parametrize('share', [0.01, -0.01])
+def test_a_position_that_drifts_for_hours_is_a_trend_and_a_jump_a_fault(followed, share):
+    rows = following(2 * HOUR, seed=4)
+    rows[:, X] += share * np.minimum(rows[:, T] / HOUR, 1.5)
+    monitor = ScadaMonitor(SETTINGS, followed)
+    assert not monitor.run_samples(rows)['alarm'].any()
+    assert 'the stem has drifted by' in monitor.drifts()[0]
+    rows = following(1300, seed=5)
+    rows[1000:, X] += 2.0 * share
+    trace = ScadaMonitor(SETTINGS, followed).run_samples(rows)
+    assert 1000 <= trace['t'][trace['alarm']][0] <= 1180
+
+
+@pytest.mark.parametrize(('share', 'alarm'), [(0.4, False), (0.7, True)])
+def test_a_pressure_that_leaves_its_level_is_a_witness_until_it_is_far_off(share, alarm):
+    rows = driven(270, seed=11)
+    rows[:, F] *= 0.5
+    reference = learn(rows, SETTINGS)
+    drop = 0.9e6 / 3.5e6  # of P1
+    rows = driven(160, 12, 100, f17=share * drop)
+    rows[:, F] *= 0.5
+    monitor = ScadaMonitor(SETTINGS, reference)
+    monitor.run_samples(rows)
+    peak = monitor.state.peaks[TEST_NAMES.index('process/0.5')]
+    assert (peak >= 1.0) == alarm
+
+
+@pytest.mark.parametrize(('moves', 'friction'), [(False, False), (True, True)])
+def test_a_stem_at_rest_shows_its_friction_once(moves, friction):
+    s, ref = np.zeros(1, MONITOR)[0], np.zeros(1, REFERENCE)[0]
+    ref.s1, ref.kap2, ref.llr_limit = 0.0017, 1.0, 40.0
+    s.testable[:] = 1
+    largest = 0.0
+    for k in range(HOUR):  # the model is off by 0.4 sigma, the copy with more play is not
+        s.xm[0] = 0.5 + (0.01 * (k // 30 % 2) if moves else 0.0)
+        s.residual[0] = 0.0007
+        s.xd = s.xm[0] + 0.0007
+        weigh_friction(s, ref)
+        largest = max(largest, float(s.llr))
+    assert (largest >= ref.llr_limit) == friction
