@@ -25,7 +25,7 @@ TRANSIENT_ROOM = 1.2
 LARGE = 10.0  # sigma
 SLOW_RATE = 0.02  # stroke/s: so slow a stem is not equally slow at all places
 SLOW_TRANSIENT = 0.2  # and this share of the way still to go is not known
-LIMITED = 0.7  # of a rate limit that was found: seen to hold
+LIMITED = 0.7  # of the fastest motion in the record: what the law was seen to hold for
 BETTER = 0.98  # a further parameter must cut the error to this share
 FINER, ROUNDS = 0.998, 4  # a better value of one that is there, to this; how often
 FACTORS = (0.75, 0.87, 1.15, 1.3)
@@ -170,8 +170,8 @@ def _proven(law: np.ndarray, pieces: Sequence[Piece]) -> None:
         moved = np.sort(np.maximum(sign * rate, 0.0))
         seen = float(moved[-max(3, len(moved) // 1000)]) if len(moved) > 10 else 0.0
         limit = float(law[name][0])
-        slow = LIMITED * limit if limit < FAST and seen > 0.5 * limit else min(seen, limit)
-        law[f'slow_{name}'] = max(min(slow, limit), min(SLOWEST, limit))
+        slow = LIMITED * min(seen, limit)
+        law[f'slow_{name}'] = max(slow, min(SLOWEST, limit))
 
 
 def _transient(law: np.ndarray, beyond: Floats, ahead: Floats, sigma: float) -> float:
