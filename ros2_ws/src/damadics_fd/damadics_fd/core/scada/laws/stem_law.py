@@ -176,8 +176,8 @@ def shrink(value: float, allowance: float) -> float:
     """
     Return what of a residual lies beyond an allowance.
 
-    >>> shrink(0.5, 0.2), shrink(-0.1, 0.2)
-    (0.3, 0.0)
+    >>> shrink(0.5, 0.2), shrink(-0.5, 0.2)
+    (0.3, -0.3)
     """
     return math.copysign(max(abs(value) - allowance, 0.0), value)
 
