@@ -165,7 +165,8 @@ def _choose_stem(
     ref.hold = hold > 0
     smallest, factor = JUMPS
     largest = float(np.abs(np.diff(part[:, CV])).max())
-    ref.cv_jump = NEVER if hold else max(smallest, factor * largest)
+    shown = hold and largest > smallest  # small changes do not tell when CV came
+    ref.cv_jump = NEVER if shown else max(smallest, factor * largest)
     prediction = candidates[hold]
     ref.w[:used], _ = _bias(prediction.phi, x - prediction.xm, used)
     ref.x_mean, ref.x_sd = prediction.xm.mean(), max(prediction.xm.std(), 1e-3)
