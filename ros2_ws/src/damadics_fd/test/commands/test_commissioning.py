@@ -60,6 +60,16 @@ def test_proposed_settings_watch_the_valve_without_alarm(proposal, recording):
     assert 'extrapolation by a factor of 7' in limit.statement()
 
 
+@pytest.mark.parametrize(('stated', 'told'), [(1.0, True), (1.2, False)])
+def test_a_spring_that_is_not_the_stated_one_is_never_ok(recording, stated, told):
+    sheet = SHEET.replace(stiffness=stated * 60892.0)
+    found = propose(recording, sheet, {'stiffness'})
+    reasons = [r for r in found.limiting if '1.25 times as stiff as stated' in r]
+    assert bool(reasons) == told
+    assert found.verdict != 'ok' or not told
+    assert not any('as stiff as stated' in r for r in propose(recording, sheet).limiting)
+
+
 def test_nominal_valve_gets_about_the_specified_constants():
     s = propose(valve(200.0, friction=0.0108)).settings
     assert s.delta == pytest.approx(0.03, rel=0.4)

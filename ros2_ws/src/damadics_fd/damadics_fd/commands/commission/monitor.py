@@ -23,6 +23,7 @@ from damadics_fd.commands.commission.verdict import (
     GOOD_FRICTION,
     GOOD_SPRING,
     Found,
+    another_valve,
     hidden_friction,
     parts_differ,
     sheet_differs,
@@ -156,6 +157,7 @@ def _propose(
     elif not dead and (hour.friction > GOOD_FRICTION or hour.spring > GOOD_SPRING):
         limiting.append(missed)
     limiting += parts_differ(balance)
+    limiting += another_valve(balance, sheet, given)
     if result.detections:
         first = (result.detections[0].stamp - int(columns['stamp'][0])) * 1e-9
         limiting.append(

@@ -16,6 +16,7 @@ from damadics_fd.core.signature.settings import SignatureSettings
 PARTS = 4  # of the moving time, compared with each other
 CERTAIN = 4.0  # standard deviations
 SHEET = 0.05  # share by which a stated constant may be off without a word
+ANOTHER = 0.2  # share by which no spring is off its data sheet
 REFERENCE = 2.0  # inflation of the variance of the reference, as in the signature
 GOOD_FRICTION, GOOD_SPRING = 1.0, 0.2  # smallest changes found of a valve that is not limited
 FREE = 2e-3  # of the spring force: friction of a valve that hardly has any
@@ -135,6 +136,26 @@ def sheet_differs(b: Balance, sheet: Settings, given: Collection[str]) -> list[s
     if sheet.plug_diameter > 0.0 and abs(b.gain - 1.0) > SHEET:
         found.append(f'the plug force is {b.gain:.2f} of what plug_diameter and plug_table say')
     return found
+
+
+def another_valve(b: Balance, sheet: Settings, given: Collection[str]) -> list[str]:
+    """
+    Tell where the stated spring is so far from the one found that the data sheet is another's.
+
+    Stiffness is found as force over way: a wrong stroke or area shifts it as a wrong spring does.
+
+    :param b: the balance.
+    :param sheet: what was stated.
+    :param given: names of what was stated.
+    :return: a sentence, none where it fits or no stiffness was stated.
+    """
+    share = b.settings.stiffness / sheet.stiffness
+    if 'stiffness' not in given or 1.0 - ANOTHER <= share <= 1.0 + ANOTHER:
+        return []
+    return [
+        f'the spring is {share:.2f} times as stiff as stated: stroke, area or stiffness is not '
+        'that of this valve, and sizes in N and mm are off; changes are still told as shares'
+    ]
 
 
 def hidden_friction(b: Balance) -> bool:
