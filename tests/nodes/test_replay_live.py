@@ -46,7 +46,7 @@ def at_scada_rate(scenario: str) -> dict[str, np.ndarray]:
     ('mode', 'source', 'speeds', 'changes'),
     [
         ('paper', lambda: excerpt('dablib_spring', 66.0, 74.0), (8,), {}),
-        ('monitor', lambda: excerpt('lugre_spring', 52.0, 72.0), (4,), QUICK),
+        ('monitor', lambda: excerpt('lugre_spring', 48.0, 72.0), (4,), QUICK),
         ('scada', lambda: at_scada_rate('f16_B'), (150,), {}),
     ],
     ids=['paper', 'monitor', 'scada'],
@@ -81,7 +81,7 @@ def test_live_and_offline_agree_bit_for_bit(tmp_path, mode, source, speeds, chan
 
 
 def test_live_replay_publishes_signature_and_events_as_the_nodes_do(tmp_path):
-    columns = excerpt('lugre_spring', 52.0, 72.0)
+    columns = excerpt('lugre_spring', 48.0, 72.0)
     source = tmp_path / 'source.mcap'
     write_columns(source, columns, frame_id='LV-101')
     own = {**surroundings(free_domain()), 'XDG_STATE_HOME': str(tmp_path / 'state')}
