@@ -23,6 +23,7 @@ OFFSET_SPREAD = 0.05
 SLOWEST = 1.0 / 120.0  # stroke/s: a positioner that passes no more air than this is rare
 TRANSIENT_ROOM = 1.2
 LARGE = 10.0  # sigma
+ARRIVED = 0.05  # of the stroke still to go, or a little while ago: nearer, the stem is there
 SLOW_RATE = 0.02  # stroke/s: so slow a stem is not equally slow at all places
 SLOW_TRANSIENT = 0.2  # and this share of the way still to go is not known
 LIMITED = 0.7  # of the fastest motion in the record: what the law was seen to hold for
@@ -55,6 +56,7 @@ class StemFit:
     :param sigma: robust standard deviation of the error.
     :param gain: gain that the record alone shows, without what is expected of a positioner.
     :param gain_error: its standard error; infinite where CV hardly moves.
+    :param arrived_error: the same from a stem that has arrived, whatever its rates.
     """
 
     law: np.ndarray
@@ -63,6 +65,7 @@ class StemFit:
     sigma: float
     gain: float
     gain_error: float
+    arrived_error: float
 
 
 def run_law(law: np.ndarray, pieces: Sequence[Piece]) -> Floats:
@@ -206,6 +209,7 @@ def _finish(law: np.ndarray, pieces: Sequence[Piece], x: Floats) -> StemFit:
     variance = sigma**2 / share
     sums = design.T @ (design * weight[:, None])
     error = math.sqrt(variance / sums[1, 1]) if sums[1, 1] > 0.0 else math.inf
+    arrived = _arrived_error(u, weight * (track[:, COPIES] < ARRIVED), variance)
     prior = np.diag([1.0 / OFFSET_SPREAD**2, 1.0 / GAIN_SPREAD**2]) * variance
     theta = np.linalg.solve(sums + prior, design.T @ (weight * target))
     covariance = np.linalg.inv(sums + prior) * variance
@@ -217,4 +221,13 @@ def _finish(law: np.ndarray, pieces: Sequence[Piece], x: Floats) -> StemFit:
     left = x - position[:, 0]
     beyond = x - np.clip(x, position.min(axis=1), position.max(axis=1))
     law['transient'] = _transient(law, beyond, track[:, COPIES], sigma)
-    return StemFit(law, position, left, spread_of(left), 1.0 + float(free[1]), error)
+    return StemFit(law, position, left, spread_of(left), 1.0 + float(free[1]), error, arrived)
+
+
+def _arrived_error(u: Floats, weight: Floats, variance: float) -> float:
+    """Return the standard error of a gain that only a stem that has arrived tells."""
+    total = float(weight.sum())
+    if total <= 0.0:
+        return math.inf
+    about = float((weight * (u - float((weight * u).sum()) / total) ** 2).sum())
+    return math.sqrt(variance / about) if about > 0.0 else math.inf
