@@ -92,6 +92,8 @@ class Source:
             feed.begin(time.monotonic_ns())
             if self._poll or not await self._subscribe(client, feed, spaces):
                 polled.append(asyncio.create_task(self._read_on(client, feed, spaces)))
+        for feed in self._feeds:
+            feed.heard = time.monotonic()  # while they were made, nobody spoke
         self._connection.works()
         self._log(f'connected to {self._connection.place}: {len(self._joiners)} valve(s)')
         if self._unknown:
