@@ -146,6 +146,13 @@ def test_a_valve_that_changes_while_it_is_learned_is_not():
         changing.estimator.learned()
 
 
+def test_nor_is_one_that_changes_before_it_has_slid_both_ways_for_long_enough():
+    settings = QUICK.replace(t_learn=14.0)
+    changing = lived(60.0, settings, friction=lambda t: 0.011 * (1.0 + 2.0 * (t > 8.0)))
+    assert PHASE_MONITOR not in changing.estimates['phase']
+    assert 'learning was refused' in changing.estimator.status
+
+
 @pytest.mark.parametrize(
     ('valve_is', 'said'),
     [

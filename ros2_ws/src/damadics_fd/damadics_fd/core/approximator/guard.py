@@ -28,6 +28,8 @@ PRIOR = (0.05, 0.05, 0.02)  # standard deviations of offset, dK/K, friction
 SIGMA_MIN = 1e-3  # of K L: model error of the moving stem
 QUICK = 0.5  # s; mean over which a force that leaves the fit is judged
 ENOUGH = 8.0  # weight that makes a block comparable, in correlation times
+KNOWN = 2.0  # weight of a direction, more than what a reversal leaves of the other one
+BLIND = 1.0  # standard deviation of offset against friction where a direction is not known
 CONFIDENCE = 3.5  # standard deviations
 FAR = 0.15  # change of stiffness, or of the force / (K L), that no valve of that sheet has
 LEFT_OVER, LEAST_LEFT = 0.75, 0.015  # misfit: share of the friction, and of K L at least
@@ -132,7 +134,7 @@ def invert(a: Floats) -> None:
 @jit
 def both_ways(s: State) -> bool:
     """
-    Tell whether the first block holds enough motion in both directions to be compared with.
+    Tell whether the first block holds enough motion in both directions to be complete.
 
     From motion in one direction a friction is as good an explanation as an offset.
 
@@ -140,6 +142,47 @@ def both_ways(s: State) -> bool:
     :return: False where more blocks belong to the first one.
     """
     return bool(s.base[0] - abs(s.base[3]) >= ENOUGH)
+
+
+@jit
+def knows(b: Floats, d: float, least: float) -> bool:
+    """
+    Tell whether the sums hold motion in a direction.
+
+    :param b: sums, see `collect`.
+    :param d: direction of motion, -1 or 1.
+    :param least: its least weight; KNOWN where less may be no more than a reversal.
+    :return: False where there is less.
+    """
+    return bool(b[0] + d * b[3] >= 2.0 * least)
+
+
+@jit
+def shared(s: State) -> bool:
+    """
+    Tell whether the block holds enough motion in a direction that the first one knows.
+
+    :param s: state record.
+    :return: False where there is nothing to compare.
+    """
+    up = knows(s.base, 1.0, KNOWN) and knows(s.block, 1.0, ENOUGH)
+    return bool(up or (knows(s.base, -1.0, KNOWN) and knows(s.block, -1.0, ENOUGH)))
+
+
+@jit
+def blind(b: Floats, cov: Floats) -> None:
+    """
+    Let a direction that the sums do not know tell nothing.
+
+    :param b: sums, see `collect`.
+    :param cov: covariance of their fit, in and out.
+    """
+    for d in (-1.0, 1.0):
+        if not knows(b, d, KNOWN):  # offset - d friction is known, offset + d friction is not
+            cov[0, 0] += BLIND * BLIND
+            cov[2, 2] += BLIND * BLIND
+            cov[0, 2] += d * BLIND * BLIND
+            cov[2, 0] += d * BLIND * BLIND
 
 
 @jit
@@ -151,7 +194,11 @@ def compare(s: State, c: Settings) -> None:
     :param c: settings record: what change of offset, stiffness and friction is tolerated.
     """
     theta, cov = np.zeros(FORCE), np.zeros((FORCE, FORCE))
+    s.sigma = fit(s.base, s.theta, s.cov)
     fit(s.block, theta, cov)
+    if not both_ways(s):
+        blind(s.base, cov)
+        blind(s.block, cov)
     for i in range(FORCE):
         s.change[i] = theta[i] - s.theta[i]
         for j in range(FORCE):
@@ -169,7 +216,10 @@ def compare(s: State, c: Settings) -> None:
 @jit
 def close_block(s: State, c: Settings) -> bool:
     """
-    End a block with enough motion: add it to the first one or compare it, and pool all.
+    End a block with enough motion: compare it with the first one, and pool all.
+
+    A first block that lacks a direction takes up those that agree with what it does tell; once
+    the valve has changed, none that only shows the other direction, where the change is unseen.
 
     :param s: state record: proven out, the bound that was learned on a valve that stayed the same.
     :param c: settings record.
@@ -178,16 +228,16 @@ def close_block(s: State, c: Settings) -> bool:
     if s.block[0] < ENOUGH:
         return True
     same = True
-    if not both_ways(s):
-        s.base[:] += s.block
-        s.pool[:] = s.base
-    else:
-        s.sigma = fit(s.base, s.theta, s.cov)
+    if s.base[0] > 0.0:
         compare(s, c)
         same = s.distance <= c.settled_max
+    if both_ways(s):
         s.proven = network.bound(s, 0.0)
         if same:
             s.pool[:] += s.block
+    elif same and (s.unsettled == 0 or shared(s)):
+        s.base[:] += s.block
+        s.pool[:] = s.base
     if same:
         s.sigma = fit(s.pool, s.theta, s.cov)
     s.block[:] = 0.0
@@ -262,15 +312,19 @@ def strays(s: State, c: Settings, dt: float, x1: float, left: float) -> bool:
     :param left: u - x1 - (alpha1/alpha5) x2 [1].
     :return: True where it has.
     """
-    if not both_ways(s):
-        return False
     d = s.direction
+    whole = both_ways(s)
+    if not (whole or knows(s.base, d, KNOWN)):
+        s.drift = 0.0
+        return False
     error = left - s.theta[0] - s.theta[1] * x1 - s.theta[2] * d
     s.drift += min(dt / QUICK, 1.0) * (error - s.drift)
     noise = 5.0 * s.sigma * math.sqrt(CORRELATION / QUICK) + 4.0 * math.sqrt(
         max(spread(s, x1, d), 0.0)
     )
     friction = max(s.theta[2], math.sqrt(s.cov[2, 2]), c.settled_friction)
+    if not (whole or knows(s.base, -d, KNOWN)):  # what is taken for an offset may be friction
+        friction = max(friction, abs(s.theta[0]) + abs(s.theta[2]))
     if abs(s.drift) <= 1.5 * friction + noise:
         return False
     s.change[0] = s.drift
