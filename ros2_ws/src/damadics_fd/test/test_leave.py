@@ -17,6 +17,7 @@ leave.PATIENCE = 0.5
 libc = ctypes.CDLL(None)
 libc.__cxa_atexit(libc.pause, None, None)  # a destructor that never returns
 """
+CRASH = STUCK.replace('libc.pause', 'libc.abort').replace('never returns', 'crashes')
 OTHERS = """
 import atexit, threading, time
 atexit.register(print, 'called at the end')
@@ -48,6 +49,13 @@ def test_the_exit_code_is_that_of_the_work(code: int, before: str) -> None:
     """Also where a destructor hangs; what was printed is there."""
     end = end_of(f"print('written', end='')\nreturn {code}", before)
     assert (end.returncode, end.stdout, end.stderr) == (code, 'written', '')
+
+
+@pytest.mark.parametrize('code', [0, 1])
+def test_a_destructor_that_crashes_changes_no_exit_code(code: int) -> None:
+    """As a damaged heap does when the middleware is taken down."""
+    end = end_of(f"print('written', end='')\nreturn {code}", CRASH)
+    assert (end.returncode, end.stdout) == (code, 'written')
 
 
 @pytest.mark.parametrize(
