@@ -30,8 +30,8 @@ class Listeners:
     """
     How many subscribe to a topic of this node.
 
-    The middleware is asked each time: its events of matched publishers come late under load, and
-    with them a process of rclpy's events executor was seen to die of a damaged heap.
+    The middleware is asked each time. While its events of matched publishers were used with
+    rclpy's events executor, messages were lost and a process died at its end of a damaged heap.
 
     :param publisher: of the topic.
     """
