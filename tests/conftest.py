@@ -19,6 +19,14 @@ from rclpy.qos import QoSProfile
 
 QUIET = 0.012  # s that the loop of `promised` takes on the machine that the times are promised on
 PATIENCE = 120.0  # s for what takes a second or two: a busy machine is no failure
+SERVERS = ('connect', 'page')  # folders whose tests start servers
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark the tests of the page and of the connectors: they run beside those of the nodes."""
+    for item in items:
+        if item.path.parent.name in SERVERS:
+            item.add_marker(pytest.mark.servers)
 
 
 class Peer:

@@ -177,11 +177,14 @@ def soak(folder: Path, minutes: float, rate: float, factor: float) -> list[str]:
         judged = read_columns(folder / 'bag', f'/{name}/residual')['stamp']
         steps = np.diff(stamp)
         lost = round(float((steps / steps.min() - 1.0).sum()))
-        late = len(stamp) - len(judged)
+        at_ends = (stamp < judged[0]) | (stamp > judged[-1])
+        passed_over = int(np.count_nonzero(~at_ends & ~np.isin(stamp, judged)))
+        late = int(np.count_nonzero(at_ends))
         raised = alarms(folder / 'bag', f'/{name}/fault_event')
-        print(f'{name}: {len(stamp)} samples, {lost} lost, {late} not judged, {raised} alarms')
-        if lost or abs(late) > rate * factor or raised:
-            found.append(f'{name}: {lost} lost, {late} not judged, {raised} alarms')
+        counts = f'{lost} lost, {passed_over} not judged, {late} at the ends, {raised} alarms'
+        print(f'{name}: {len(stamp)} samples, {counts}')
+        if lost or passed_over or late > rate * factor or raised:
+            found.append(f'{name}: {counts}')
     print(f'{minutes:g} min at {factor:g} x, {rate:g} Hz, {opened} pages open')
     return found
 

@@ -1,6 +1,7 @@
 #!/bin/bash
 # Run all tests in two streams side by side: those of running nodes, which wait most of their time,
-# and all others, at low priority. What is given is passed on to pytest.
+# and all others, first what starts nothing, at low priority, then page and connectors.
+# What is given is passed on to pytest.
 set -uo pipefail
 cd "$(dirname "$0")/.."
 
@@ -15,19 +16,31 @@ sys.exit(ending(lambda: int(pytest.main())))
 ' -m "$which" -o pythonpath=tests -o "cache_dir=.pytest_cache/$name" "$@"
 }
 
-others=$(mktemp)
-trap 'kill "${beside:-}" 2> /dev/null; rm -f "$others"' EXIT
+beside() {
+  (renice -n 19 "$BASHPID" > /dev/null; stream others 'not slow and not ros' "$@")
+  others=$?
+  stream servers 'not slow and ros and servers' "$@"
+  merged "$others" $?
+}
+
+# Return one code for two; pytest ends with 5 where a stream has no test that was asked for.
+merged() {
+  local code
+  for code in "$@"; do
+    [[ $code == 0 || $code == 5 ]] || return 1
+  done
+  [[ $1 == 0 || $2 == 0 ]] || return 5
+}
+
+output=$(mktemp)
+trap 'kill "${beside:-}" 2> /dev/null; rm -f "$output"' EXIT
 echo 'Testing in two streams: the nodes here, all others beside it (shown when they are done) ...'
-(renice -n 19 "$BASHPID" > /dev/null; stream others 'not slow and not ros' "$@") > "$others" 2>&1 &
+beside "$@" > "$output" 2>&1 &
 beside=$!
-stream nodes 'not slow and ros' "$@"
+stream nodes 'not slow and ros and not servers' "$@"
 nodes=$?
 wait "$beside"
 rest=$?
 beside=
-cat "$others"
-# pytest ends with 5 where a stream has no test that was asked for
-for code in "$nodes" "$rest"; do
-  [[ $code == 0 || $code == 5 ]] || exit 1
-done
-[[ $nodes == 0 || $rest == 0 ]] || exit 5
+cat "$output"
+merged "$nodes" "$rest"
