@@ -2,14 +2,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """The twin of a valve: read from a file, refused with what is wrong in it."""
 
+import numpy as np
 import pytest
 import yaml
 from damadics_fd.commands.commission.command import main as commission
+from damadics_fd.commands.commission.monitor import identify
+from damadics_fd.commands.commission.twin import twin
+from damadics_fd.core.settings import Settings
 from damadics_fd.core.settings.document import COMMISSION, ValveDocument, section
-from damadics_fd.core.settings.identified import VERDICTS
-from damadics_plant import LuGreActuator
-from damadics_plant.actuator.twin import ENTRY, Origin, origin, parts_of, read_twin
+from damadics_fd.core.settings.identified import VERDICTS, FaultFree
+from damadics_plant import Actuator, LuGreActuator, Scenario, simulate
+from damadics_plant.actuator.twin import ENTRY, Origin, origin, parts_of, read_twin, twin_of
 from damadics_plant.command import main
+from damadics_plant.scenarios.sources import RandomSteps, Sine
 
 VALUES = {
     'stroke': 0.05,
@@ -80,6 +85,30 @@ def test_the_file_of_a_valve_runs_as_it_is(tmp_path, capsys):
     words = ['nominal', '--valve', str(valve), '--duration', '10']
     assert main([*words, '--quiet', '--out', str(again)]) == 0
     assert len(again.read_text().splitlines()) == 1002  # at the rate of the file, and a header
+
+
+@pytest.mark.parametrize('plant', [Actuator, LuGreActuator])
+def test_a_twin_moves_as_the_valve_did(plant):
+    build = plant(lag=0.42, air_flow=1.9e-6)
+    scenario = Scenario(
+        name='strokes',
+        duration=480.0,
+        cv=RandomSteps(seed=5),
+        p1=Sine(3.5e6, 7e4, 0.1),
+        p2=Sine(2.6e6, 2.6e4, 0.3),
+    )
+    truth = simulate(scenario, rate=200.0, model=build)
+    rng, half = np.random.default_rng(5), len(truth['x1']) // 2
+    noise = {'x1': 5e-4, 'ps': 150.0, 'p1': 2e3, 'p2': 2e3}
+    columns = {name: np.array(truth[name])[:half] for name in ('stamp', 'cv', *noise)}
+    for name, std in noise.items():
+        columns[name] = columns[name] + std * rng.standard_normal(half)
+    found = twin(identify([FaultFree('first half', columns)], Settings.for_mode('monitor')))
+    assert found['lag'] == pytest.approx(build.lag, rel=0.05)
+    assert found['air_flow'] == pytest.approx(build.air_flow, rel=0.05)
+    again = simulate(scenario, rate=200.0, model=twin_of(found, 'here'))
+    error = (again['x1'] - truth['x1'])[half:]
+    assert np.sqrt(np.mean(error**2)) < 0.01
 
 
 def test_a_parameter_file_is_no_twin(tmp_path):

@@ -70,6 +70,20 @@ def test_a_spring_that_is_not_the_stated_one_is_never_ok(recording, stated, told
     assert not any('as stiff as stated' in r for r in propose(recording, sheet).limiting)
 
 
+def test_what_no_recording_can_check_of_the_sheet_is_not_ok(recording):
+    stated = {'stroke', 'area'}
+    for wrong in (SHEET.replace(stroke=1.6 * SHEET.stroke), SHEET.replace(area=1.6 * SHEET.area)):
+        found = propose(recording, wrong, stated)
+        assert found.verdict != 'ok'
+        assert any('taken from the settings, which no recording' in r for r in found.limiting)
+        true = wrong.replace(stiffness=1.25 * 60892.0)
+        found = propose(recording, true, stated | {'stiffness'})
+        assert any('times as stiff as stated' in r for r in found.limiting), found.limiting
+    right = SHEET.replace(stiffness=1.25 * 60892.0)
+    reasons = propose(recording, right, stated | {'stiffness'}).limiting
+    assert not any('stated' in r or 'taken from' in r for r in reasons), reasons
+
+
 def test_nominal_valve_gets_about_the_specified_constants():
     s = propose(valve(200.0, friction=0.0108)).settings
     assert s.delta == pytest.approx(0.03, rel=0.4)

@@ -8,6 +8,7 @@ asks for. Sensor noise and hum are those of the benchmark.
 """
 
 import json
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -60,6 +61,7 @@ def valve(
     position=(0.0, 0.0),
     pressure=0.0,
     dp_offset=0.0,
+    one_way=0.0,
 ):
     """Columns of a run: force balance with a fault from t_fault on, plug error from the start."""
     x = motion(seed, seconds)
@@ -69,7 +71,8 @@ def valve(
     v = np.gradient(x, DT)
     dp = 0.9e6 * (1.0 + 0.04 * np.sin(0.6 * t))
     table = np.asarray(C.plug_km) / (1.0 + gain + shape * np.sin(5.0 * np.asarray(POSITION)))
-    ps = chamber_pressure(C, x, v, dp, dK * after, dF * after, preload * after, table=table)
+    preload = preload * after + one_way * 0.0108 * (1.0 + dF * after)
+    ps = chamber_pressure(C, x, v, dp, dK * after, dF * after, preload, table=table)
     x = x * (1.0 + position[0] * after) + position[1] * after
     x = x + 1.41e-3 * rng.standard_normal(len(x)) + 2.5e-3 * np.sin(2 * np.pi * 50.0 * t)
     ps = ps * (1.0 + pressure * after) + 80.0 * rng.standard_normal(len(x))
@@ -113,6 +116,23 @@ def test_a_change_is_found_named_and_sized(change, cause, truth, tolerance):
     assert view.cause == cause
     assert view.value == pytest.approx(truth, abs=tolerance)
     assert view.confidence > 0.95
+
+
+def test_friction_that_is_larger_one_way_does_not_turn_its_size():
+    signature, _ = run(valve(seed=3, seconds=330.0, dF=2.0, one_way=0.3))
+    view = signature.view()
+    assert view.cause == 'friction_up'
+    assert view.value == pytest.approx(2.0, rel=0.05)
+    assert abs(view.value - 2.0) < 2.0 * view.std
+
+
+def test_a_preload_that_is_not_the_true_one_does_not_turn_the_spring():
+    signature = Signature(replace(C, preload=C.preload + 0.03))
+    run(valve(seed=3, seconds=330.0, dK=-0.2), signature)
+    view = signature.view()
+    assert view.cause == 'spring_softer'
+    assert view.value == pytest.approx(-0.2, rel=0.02)
+    assert abs(view.value + 0.2) < 2.0 * view.std
 
 
 def test_a_block_in_which_the_stem_jumps_and_stops_is_no_steady_motion():

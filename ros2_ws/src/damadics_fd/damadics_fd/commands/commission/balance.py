@@ -65,6 +65,7 @@ class Balance:
     noise: float  # the part of it that sensors explain [N]
     gain: float  # plug force / that of the data sheet, mean over the stroke
     shape: float  # how far it departs from that
+    plug: float  # mean plug force [N]; 0 where it was not told apart from the spring
     t: Floats
     x: Floats
     v: Floats
@@ -301,8 +302,10 @@ def _final(
     )
     sensors = float(np.std(np.diff(fit.left)[np.diff(b.index[use]) == 1])) / np.sqrt(2.0)
     names = list(undetermined)
+    pushed = float(np.mean(np.abs(A[:, TABLE:].sum(axis=1)))) if plugged else 0.0
     if plugged and float(np.std(b.dp[use])) < 1e-3 * max(float(np.mean(np.abs(b.dp[use]))), 1.0):
         names.append('plug force apart from the spring (P1 - P2 did not vary)')
+        pushed = 0.0
     return Balance(
         settings,
         lag,
@@ -314,6 +317,7 @@ def _final(
         sensors,
         gain,
         shape,
+        pushed,
         b.t[use],
         b.x[use],
         b.v[use],

@@ -3,6 +3,7 @@
 """A twin: the constants of the simulated LuGre actuator that moves as the valve did."""
 
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,6 +16,8 @@ from damadics_fd.core.record import Floats, Saved
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.settings.document import differing
 from damadics_fd.core.settings.identified import FaultFree
+from damadics_fd.core.valve.parameters import Valve
+from damadics_fd.core.valve.pneumatics import TRANSDUCER_INPUT, TRANSDUCER_OUTPUT
 
 ATMOSPHERE, GAS = 101325.0, 287.0 * 293.0  # Pa; R T of air [J/kg]
 FINE, SHORT = 0.2, 0.05  # s
@@ -24,6 +27,8 @@ ANSWER, DEAD = 0.25, 0.02  # time constants, and s, until the air answers
 LEAST_DRIVE = 3e4  # Pa
 BRISTLE = 2e-5  # m by which the stem gives before it breaks away
 STRIBECK = 1e-3  # m/s
+UNLIKE = 0.1  # of the air's movement: a positioner that leaves more is another one
+REACH = 12.0  # lags after which a step is over
 VENTING = 0.55  # of the booster's opening, at most, where it vents
 STEP = 0.05  # of the stroke; smaller steps of the command do not count
 LOOK = 3.0  # s after a step
@@ -81,7 +86,10 @@ def twin(proposal: Proposal) -> dict[str, float]:
     signals = gather([FaultFree('all', proposal.columns)])
     fine = blocks(signals, FINE, s.ps_lag)
     static = max(breakaway(proposal, blocks(signals, SHORT, s.ps_lag)), b.friction)
-    fill, vent = capacities(fine, s)
+    air = air_path(signals, s)
+    if air is None:
+        fill, vent = capacities(fine, s)
+        air = AirPath(response(signals), max(fill, vent / VENTING))
     dry = max(b.friction, 1e-3 * s.stiffness * s.stroke)
     gain = b.gain if s.plug_diameter > 0.0 else 0.0
     return {
@@ -94,8 +102,8 @@ def twin(proposal: Proposal) -> dict[str, float]:
         'dead_volume': s.chamber_volume,
         'gravity': s.gravity,
         'supply': s.supply_pressure,
-        'air_flow': max(fill, vent / VENTING),
-        'lag': response(signals),
+        'air_flow': air.flow,
+        'lag': air.lag,
         'plug_diameter': 1e3 * proposal.sheet_diameter * float(np.sqrt(gain)),
         'coulomb': dry,
         'static': max(static, 1.01 * dry),
@@ -144,6 +152,61 @@ def breakaway(proposal: Proposal, b: Blocks) -> float:
     way = np.sign(b.v[begins + 2])
     borne = np.maximum(left[begins] * way, left[begins + 1] * way)
     return float(max(np.median(borne), 0.0))
+
+
+class AirPath(NamedTuple):
+    """What stands between command and chamber."""
+
+    lag: float  # each of the two of the set-point filter [s]
+    flow: float  # factor at full opening [kg/(s sqrt(Pa))]
+
+
+def air_path(signals: Signals, s: Settings) -> AirPath | None:
+    """
+    Fit lag and flow factor of the simulated positioner to the air that went into the chamber.
+
+    With the recorded command, position and pressure, every lag foretells the flow but for its
+    factor; the lag is taken that leaves least.
+
+    :param signals: the samples.
+    :param s: settings with supply_pressure, chamber_volume, area, stroke.
+    :return: None where another positioner works there, or `ps` comes late.
+    """
+    if s.ps_lag > 0.0:
+        return None
+    b = blocks(signals, SHORT)
+    k = np.arange(b.index[0], b.index[-1] + 1)
+    cv, x, ps = (np.interp(k, b.index, column) for column in (b.cv, b.x, b.ps))
+    air = (ATMOSPHERE + ps) * (s.chamber_volume + s.area * s.stroke * x) / GAS
+    near = np.isin(k[:-1], b.index) & np.isin(k[1:], b.index)
+    put = np.diff(air)[near]
+    valve = Valve()
+    angle = 0.5 + np.arcsin(np.clip(x - 0.5, -1.0, 1.0)) * (180.0 / np.pi) / 60.0
+    held = 0.5 * valve.positioner_period / SHORT  # how late its samples are, in blocks
+
+    def fit(lag: float) -> tuple[float, float]:
+        reach = np.arange(round(REACH * lag / SHORT) + 1) * SHORT
+        kernel = (1.0 + reach / lag) * np.exp(-reach / lag)  # what is still missing of a step
+        kernel = -np.diff(kernel, append=0.0)
+        start = np.full(len(kernel) - 1, cv[0])
+        set_point = np.convolve(np.concatenate([start, cv]), kernel, 'valid')
+        error = np.clip(valve.positioner_gain * (set_point - angle), -1.0, 1.0)
+        opening = np.interp(error, TRANSDUCER_INPUT, TRANSDUCER_OUTPUT)
+        opening[1:] = (1.0 - held) * opening[1:] + held * opening[:-1]
+        drop = np.where(opening > 0.0, s.supply_pressure - ps, ps)
+        rate = opening * np.sqrt(np.maximum(drop, 0.0)) * SHORT
+        rate = (0.5 * (rate[1:] + rate[:-1]))[near]
+        factor = float(rate @ put) / max(float(rate @ rate), 1e-300)
+        return float(np.sum((put - factor * rate) ** 2)), factor
+
+    lags = np.geomspace(0.02, 5.0, 30)
+    best = int(np.argmin([fit(lag)[0] for lag in lags]))
+    around = np.linspace(lags[max(best - 1, 0)], lags[min(best + 1, len(lags) - 1)], 41)
+    lag = float(min(around, key=lambda lag: fit(lag)[0]))
+    left, flow = fit(lag)
+    if flow <= 0.0 or left > UNLIKE * float(put @ put):
+        return None
+    return AirPath(lag, flow)
 
 
 def capacities(b: Blocks, s: Settings) -> tuple[float, float]:

@@ -17,6 +17,8 @@ PARTS = 4  # of the moving time, compared with each other
 CERTAIN = 4.0  # standard deviations
 SHEET = 0.05  # share by which a stated constant may be off without a word
 ANOTHER = 0.2  # share by which no spring is off its data sheet
+TELLING_PLUG = 0.2  # of the spring force over the stroke: a plug force that tells the area
+OTHER_PLUG = 1.4  # factor on the plug force beyond which it is not that of the sheet
 REFERENCE = 2.0  # inflation of the variance of the reference, as in the signature
 GOOD_FRICTION, GOOD_SPRING = 1.0, 0.2  # smallest changes found of a valve that is not limited
 FREE = 2e-3  # of the spring force: friction of a valve that hardly has any
@@ -140,22 +142,40 @@ def sheet_differs(b: Balance, sheet: Settings, given: Collection[str]) -> list[s
 
 def another_valve(b: Balance, sheet: Settings, given: Collection[str]) -> list[str]:
     """
-    Tell where the stated spring is so far from the one found that the data sheet is another's.
+    Tell where the data sheet is another valve's, or what of it no recording can check.
 
-    Stiffness is found as force over way: a wrong stroke or area shifts it as a wrong spring does.
+    Pressures and positions as shares give forces in units of the area, and nothing in metres. A
+    stated stiffness tells the stroke, a plug force as the sheet has it tells the area.
 
     :param b: the balance.
     :param sheet: what was stated.
     :param given: names of what was stated.
-    :return: a sentence, none where it fits or no stiffness was stated.
+    :return: a sentence for each, none where the stiffness is stated and all fits.
     """
+    found = []
     share = b.settings.stiffness / sheet.stiffness
-    if 'stiffness' not in given or 1.0 - ANOTHER <= share <= 1.0 + ANOTHER:
-        return []
-    return [
-        f'the spring is {share:.2f} times as stiff as stated: stroke, area or stiffness is not '
-        'that of this valve, and sizes in N and mm are off; changes are still told as shares'
-    ]
+    stated = 'stiffness' in given
+    if stated and not 1.0 - ANOTHER <= share <= 1.0 + ANOTHER:
+        found.append(
+            f'the spring is {share:.2f} times as stiff as stated: stroke, area or stiffness is '
+            'not that of this valve, and sizes in N and mm are off; changes are told as shares'
+        )
+    telling = b.plug > TELLING_PLUG * b.settings.stiffness * b.settings.stroke
+    fits = 1.0 / OTHER_PLUG <= b.gain <= OTHER_PLUG
+    if telling and not fits:
+        found.append(
+            f'the plug force is {b.gain:.2f} of what area, plug_diameter and plug_table say: one '
+            'of them is not that of this valve, or its trim is balanced; where it is the area, '
+            'sizes in N are off; changes are still told as shares'
+        )
+    if not stated:
+        unseen = 'the stroke is' if telling and fits else 'stroke and area are'
+        found.append(
+            f'{unseen} taken from the settings, which no recording checks: state the '
+            'stiffness of the spring too (--set stiffness=N/m); N/m and mm are as good as they, '
+            'changes told as shares are right in any case'
+        )
+    return found
 
 
 def hidden_friction(b: Balance) -> bool:

@@ -8,7 +8,7 @@ from damadics_fd.core.jit import jit, layer
 from damadics_fd.core.signature.cues import stick_evidence
 from damadics_fd.core.signature.evidence import clear_set, due, evaluate
 from damadics_fd.core.signature.settings import SignatureSettings
-from damadics_fd.core.signature.size import joint_change, physical_value
+from damadics_fd.core.signature.size import joint_change, physical_value, size_beside_offset
 from damadics_fd.core.signature.state import (
     CAUSE_ELASTIC,
     CAUSE_FRICTION_DOWN,
@@ -289,6 +289,8 @@ def second_stage(s: State, c: SignatureSettings) -> None:
     if not due(s, m, STAGE2_STRIDE, s.ne[m] >= STAGE2_EVIDENCE):
         return
     D = evaluate(s, c, m, c.model_error_stage2, 0.0, 0.0)
+    if s.D[m] > 0.0:
+        size_beside_offset(s, c, m, c.model_error_stage2)
     joint_change(s, c, m)
     if c.d_decide >= D:
         return

@@ -35,11 +35,10 @@ from damadics_fd.core.signature.state import (
     State,
     V,
 )
-from damadics_fd.core.signature.sums import clear_sums, growth_time
+from damadics_fd.core.signature.sums import clear_sums, growth_time, precision
 
 # column of hypotheses 3 to 7: 1, position gain, chamber pressure, P1 - P2, position offset
 COLUMN = np.array([-1, -1, -1, ONE, N_REF + 3, N_REF, N_REF + 1, N_REF + 2])
-# columns of the hypotheses with several
 FRICTION_COLUMNS = np.array([SIGN, V, SIGN_T])
 SPRING_COLUMNS = np.array([X1, X1_T])
 MIN_EVIDENCE = 4.0  # blocks
@@ -173,6 +172,40 @@ def combine(
 
 
 @jit
+def share_friction(s: State, m: int, count: int, third: float) -> float:
+    """
+    Restate the friction just solved for as shares.
+
+    :param s: state record after `solve_group`; value, sd, dry and apart of the set are written.
+    :param m: index of the set.
+    :param count: number of columns.
+    :param third: weight of the third column: the time of what grows, 0 of an offset.
+    :return: friction at the mean speed, the unit of the value [1].
+    """
+    v_mean = s.vb[m] / s.ne[m]
+    scale: float = max(s.theta[SIGN] + s.theta[V] * v_mean, SMALL_FRICTION)
+    s.value[m][FRICTION], s.sd[m][FRICTION] = combine(s, count, 1.0, v_mean, third, scale)
+    dry = max(s.theta[SIGN], SMALL_FRICTION)
+    s.dry[m], s.dry_sd[m] = combine(s, count, 1.0, 0.0, third, dry)
+    gap = 1.0 / dry - 1.0 / scale
+    s.apart[m], s.apart_sd[m] = combine(s, count, gap, -v_mean / scale, gap * third, 1.0)
+    return scale
+
+
+@jit
+def share_spring(s: State, m: int, count: int, second: float) -> None:
+    """
+    Restate the stiffness just solved for as a share, as `share_friction` does.
+
+    :param s: state record after `solve_group`; value and sd of the set are written.
+    :param m: index of the set.
+    :param count: number of columns.
+    :param second: weight of the second one.
+    """
+    s.value[m][SPRING], s.sd[m][SPRING] = combine(s, count, 1.0, second, 0.0, s.theta[X1])
+
+
+@jit
 def evaluate(s: State, c: SignatureSettings, m: int, eps: float, b_r: float, b_p: float) -> float:
     """
     Weigh the hypotheses on one set.
@@ -189,8 +222,7 @@ def evaluate(s: State, c: SignatureSettings, m: int, eps: float, b_r: float, b_p
     s.D[m] = 0.0
     if ne < 1.0 or (ne < MIN_EVIDENCE and b_r <= 0.0 and b_p <= 0.0):
         return 0.0
-    sigma2 = s.sigma * s.sigma
-    iv = 1.0 / (sigma2 * max(1.0, eps * eps * s.rr[m] / (sigma2 * ne)))
+    iv = precision(s, m, eps)
     J_0 = eliminate_reference(s, m, iv)
     if J_0 < 0.0:
         return 0.0
@@ -202,14 +234,8 @@ def evaluate(s: State, c: SignatureSettings, m: int, eps: float, b_r: float, b_p
     explained = solve_group(
         s, m, iv, FRICTION_COLUMNS, count, (c.change_std[1], c.change_std[0], c.growth_std[0], 1.0)
     )
-    v_mean = s.vb[m] / ne
-    scale = max(s.theta[SIGN] + s.theta[V] * v_mean, SMALL_FRICTION)
     logp[FRICTION] = J_0 - explained
-    value[FRICTION], std[FRICTION] = combine(s, count, 1.0, v_mean, now, scale)
-    dry = max(s.theta[SIGN], SMALL_FRICTION)
-    s.dry[m], s.dry_sd[m] = combine(s, count, 1.0, 0.0, now, dry)
-    gap = 1.0 / dry - 1.0 / scale
-    s.apart[m], s.apart_sd[m] = combine(s, count, gap, -v_mean / scale, gap * now, 1.0)
+    scale = share_friction(s, m, count, now)
     if value[FRICTION] < -1.3 - SMALL / scale:
         logp[FRICTION] = J_0  # friction cannot become negative
     # spring
@@ -217,7 +243,7 @@ def evaluate(s: State, c: SignatureSettings, m: int, eps: float, b_r: float, b_p
         s, m, iv, SPRING_COLUMNS, count - 1, (c.change_std[2], c.growth_std[1], 1.0, 1.0)
     )
     logp[SPRING] = J_0 - explained
-    value[SPRING], std[SPRING] = combine(s, count - 1, 1.0, now, 0.0, s.theta[X1])
+    share_spring(s, m, count - 1, now)
     if value[SPRING] < -1.05:
         logp[SPRING] = J_0
     for h in range(PRELOAD, N_HYP):

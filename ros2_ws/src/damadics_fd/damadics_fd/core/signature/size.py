@@ -7,8 +7,15 @@ import math
 import numpy as np
 
 from damadics_fd.core.jit import jit
-from damadics_fd.core.signature.evidence import eliminate_reference, solve_group
+from damadics_fd.core.record import Floats
+from damadics_fd.core.signature.evidence import (
+    eliminate_reference,
+    share_friction,
+    share_spring,
+    solve_group,
+)
 from damadics_fd.core.signature.settings import SignatureSettings
+from damadics_fd.core.signature.sliding import STICKY_DOUBT
 from damadics_fd.core.signature.state import (
     DP_OFFSET,
     FRICTION,
@@ -17,18 +24,27 @@ from damadics_fd.core.signature.state import (
     PRELOAD,
     PRESSURE_GAIN,
     SET_SLOW,
+    SET_UNIT,
     SIGN,
     SMALL_FRICTION,
     SPRING,
+    STRIBECK,
     X1,
     State,
     V,
 )
+from damadics_fd.core.signature.sums import precision
 
 UNKNOWN = 0.2  # relative deviation of the unit from which no size is stated
+LARGE = 1.0  # friction change that is stated only if it is known as well itself
 APART = 4.0  # deviations by which dry and viscous friction must have changed differently
 # what a size is in error because no valve rubs and springs as the model says, as a share of it
-MODEL_FRICTION, MODEL_SPRING = 0.08, 0.01
+MODEL_FRICTION, MODEL_SPRING = 0.08, 0.02
+STICK_SLIP = 0.2  # the same of friction, of a stem that only sticks and slips
+FRICTION_SIZE = np.array([SIGN, V, ONE])
+SPRING_SIZE = np.array([X1, ONE])
+ONE_WAY = 0.3  # of a friction change: how much more of it one way than on the mean
+ASIDE = 0.02  # [1] offset that a spring's change may leave: friction that is larger one way
 JOINT_COLUMNS = np.array([X1, ONE, SIGN, V])
 JOINT_EVIDENCE = 60.0  # blocks
 
@@ -66,6 +82,49 @@ def in_units(value: float, std: float, ratio: float, variance: float) -> tuple[f
 
 
 @jit
+def friction_at(theta: Floats, v: float) -> float:
+    """
+    Return the friction of a reference.
+
+    :param theta: its parameters, or the unit of sizes.
+    :param v: [1/s] speed.
+    :return: dry and viscous friction [1], not less than is worth a share.
+    """
+    F: float = max(theta[SIGN] + theta[V] * v, SMALL_FRICTION)
+    return F
+
+
+@jit
+def friction_error(s: State, m: int) -> float:
+    """
+    Return how wrong a friction change may be because no stem rubs as the model says.
+
+    A stem that sticks and slips bears anything between dry and static friction.
+
+    :param s: state record.
+    :param m: index of the set with the change.
+    :return: standard deviation as a share of the change.
+    """
+    jumps = max(jumping(s, m), jumping(s, SET_UNIT))
+    return math.sqrt(MODEL_FRICTION * MODEL_FRICTION + jumps * jumps * STICK_SLIP * STICK_SLIP)
+
+
+@jit
+def jumping(s: State, m: int) -> float:
+    """
+    Return the share of the blocks of a set in which the stem sticks and slips.
+
+    :param s: state record.
+    :param m: index of the set.
+    :return: 0 to 1.
+    """
+    weight = s.S[m][STRIBECK, STRIBECK]  # such a block has a 1 there, and little weight
+    blocks = weight * (1.0 + STICKY_DOUBT)
+    share: float = blocks / max(blocks + s.ne[m] - weight, 1.0)
+    return share
+
+
+@jit
 def physical_value(s: State, c: SignatureSettings, m: int, h: int) -> tuple[float, float]:
     """
     Convert a change to what a person reads.
@@ -81,13 +140,14 @@ def physical_value(s: State, c: SignatureSettings, m: int, h: int) -> tuple[floa
     value, std = s.value[m][h], s.sd[m][h]
     if h == FRICTION:
         v = s.vb[m] / max(s.ne[m], 1.0)
-        F = max(s.theta[SIGN] + s.theta[V] * v, SMALL_FRICTION)
-        F_unit = max(s.unit[SIGN] + s.unit[V] * v, SMALL_FRICTION)
+        F = friction_at(s.theta, v)
+        F_unit = friction_at(s.unit, v)
         cov = s.unit_cov
         variance = cov[SIGN, SIGN] + 2.0 * v * cov[V, SIGN] + v * v * cov[V, V]
         late = v * s.unit[X1] * c.ps_lag_std  # friction that a lag not known would show
         variance += late * late
-        if variance > (UNKNOWN * F_unit) ** 2:
+        error = friction_error(s, m)
+        if variance + (error * F_unit) ** 2 > (UNKNOWN * F_unit) ** 2:
             return math.nan, math.nan
         # the dry part leads where its share is the larger one
         beyond = s.apart[m] if value >= 0.0 else -s.apart[m]
@@ -96,11 +156,14 @@ def physical_value(s: State, c: SignatureSettings, m: int, h: int) -> tuple[floa
         leads = abs(s.dry[m]) * F_dry > 0.5 * abs(value) * F_unit
         if told and leads and cov[SIGN, SIGN] < (UNKNOWN * F_dry) ** 2:
             ratio = max(s.theta[SIGN], SMALL_FRICTION) / F_dry
-            known = cov[SIGN, SIGN] / (F_dry * F_dry) + MODEL_FRICTION * MODEL_FRICTION
+            known = cov[SIGN, SIGN] / (F_dry * F_dry) + error * error
             return in_units(s.dry[m], s.dry_sd[m], ratio, known)
         std = math.sqrt(std * std + s.apart_sd[m] * s.apart_sd[m])
-        known = variance / (F_unit * F_unit) + MODEL_FRICTION * MODEL_FRICTION
-        return in_units(value, std, F / F_unit, known)
+        known = variance / (F_unit * F_unit) + error * error
+        value, std = in_units(value, std, F / F_unit, known)
+        if abs(value) > LARGE and std > UNKNOWN * abs(value):
+            return math.nan, math.nan
+        return value, std
     if h == SPRING:
         K = s.unit[X1]
         known = s.unit_cov[X1, X1] / (K * K) + MODEL_SPRING * MODEL_SPRING
@@ -114,6 +177,29 @@ def physical_value(s: State, c: SignatureSettings, m: int, h: int) -> tuple[floa
     if h == DP_OFFSET:
         return -1e6 * value, 1e6 * std
     return value, std
+
+
+@jit
+def size_beside_offset(s: State, c: SignatureSettings, m: int, eps: float) -> None:
+    """
+    Size friction and spring anew, each with an offset beside it.
+
+    A valve that rubs more one way pushes as well, and passes for one with more preload, which a
+    spring's change would have to hold. Evidence and posteriors stay those of the plain change.
+
+    :param s: state record after `evaluate` of the set; friction and spring are written.
+    :param c: settings record.
+    :param m: index of the set.
+    :param eps: model error as a share of the signal, that of `evaluate`.
+    """
+    iv = precision(s, m, eps)
+    change = abs(s.value[m][FRICTION]) * friction_at(s.theta, s.vb[m] / s.ne[m])
+    prior = (c.change_std[1], c.change_std[0], max(ONE_WAY * change, SMALL_FRICTION), 1.0)
+    if solve_group(s, m, iv, FRICTION_SIZE, len(FRICTION_SIZE), prior) >= 0.0:
+        share_friction(s, m, len(FRICTION_SIZE), 0.0)
+    prior = (c.change_std[2], ASIDE, 1.0, 1.0)
+    if solve_group(s, m, iv, SPRING_SIZE, len(SPRING_SIZE), prior) >= 0.0:
+        share_spring(s, m, len(SPRING_SIZE), 0.0)
 
 
 @jit

@@ -85,3 +85,17 @@ def growth_time(s: State) -> float:
     """
     since = (s.t - s.alarm_t) * 1e-10
     return float(max(0.0, min(3.0, since)))
+
+
+@jit
+def precision(s: State, m: int, eps: float) -> float:
+    """
+    Return 1 / variance of a block of one set.
+
+    :param s: state record.
+    :param m: index of the set.
+    :param eps: model error as a share of the signal.
+    :return: [1].
+    """
+    sigma2 = s.sigma * s.sigma
+    return 1.0 / (sigma2 * max(1.0, eps * eps * s.rr[m] / (sigma2 * s.ne[m])))
