@@ -104,7 +104,7 @@ def test_a_twin_moves_as_the_valve_did(plant):
     for name, std in noise.items():
         columns[name] = columns[name] + std * rng.standard_normal(half)
     found = twin(identify([FaultFree('first half', columns)], Settings.for_mode('monitor')))
-    assert found['lag'] == pytest.approx(build.lag, rel=0.05)
+    assert found['lag'] == pytest.approx(build.lag, rel=0.15)
     assert found['air_flow'] == pytest.approx(build.air_flow, rel=0.05)
     again = simulate(scenario, rate=200.0, model=twin_of(found, 'here'))
     error = (again['x1'] - truth['x1'])[half:]

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A twin: the constants of the simulated LuGre actuator that moves as the valve did."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,6 +13,7 @@ from damadics_fd.commands.commission.monitor import Proposal
 from damadics_fd.commands.commission.regression import regressor
 from damadics_fd.commands.commission.signals import Blocks, Signals, blocks, gather
 from damadics_fd.commands.commission.valve_file import rows
+from damadics_fd.core.approximator.transmitter import delay_column
 from damadics_fd.core.record import Floats, Saved
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.settings.document import differing
@@ -28,6 +30,8 @@ LEAST_DRIVE = 3e4  # Pa
 BRISTLE = 2e-5  # m by which the stem gives before it breaks away
 STRIBECK = 1e-3  # m/s
 UNLIKE = 0.1  # of the air's movement: a positioner that leaves more is another one
+HUNTING = 0.03  # of the stroke, about the set-point
+ENOUGH = 200  # blocks after steps of the command, that are judged alone
 REACH = 12.0  # lags after which a step is over
 VENTING = 0.55  # of the booster's opening, at most, where it vents
 STEP = 0.05  # of the stroke; smaller steps of the command do not count
@@ -170,15 +174,22 @@ def air_path(signals: Signals, s: Settings) -> AirPath | None:
 
     :param signals: the samples.
     :param s: settings with supply_pressure, chamber_volume, area, stroke.
-    :return: None where another positioner works there, or `ps` comes late.
+    :return: None where another positioner works there.
     """
-    if s.ps_lag > 0.0:
-        return None
-    b = blocks(signals, SHORT)
+    if s.ps_lag > 0.0:  # the command as late as all else
+        dt = np.diff(signals.t, prepend=-np.inf)
+        signals = replace(signals, cv=delay_column(signals.cv, dt, s.ps_lag))
+    b = blocks(signals, SHORT, s.ps_lag)
     k = np.arange(b.index[0], b.index[-1] + 1)
     cv, x, ps = (np.interp(k, b.index, column) for column in (b.cv, b.x, b.ps))
     air = (ATMOSPHERE + ps) * (s.chamber_volume + s.area * s.stroke * x) / GAS
     near = np.isin(k[:-1], b.index) & np.isin(k[1:], b.index)
+    # a stem that sticks hunts about its set-point, where noise decides: a stroke tells
+    steps = np.abs(np.diff(cv)) > STEP
+    stroke = np.convolve(steps, np.ones(round(LOOK / SHORT)))[: len(steps)] > 0.5
+    stroke &= np.abs(cv - x)[1:] > HUNTING
+    if np.sum(near & stroke) >= ENOUGH:
+        near &= stroke
     put = np.diff(air)[near]
     valve = Valve()
     angle = 0.5 + np.arcsin(np.clip(x - 0.5, -1.0, 1.0)) * (180.0 / np.pi) / 60.0

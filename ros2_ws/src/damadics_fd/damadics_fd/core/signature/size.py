@@ -40,7 +40,7 @@ LARGE = 1.0  # friction change that is stated only if it is known as well itself
 APART = 4.0  # deviations by which dry and viscous friction must have changed differently
 # what a size is in error because no valve rubs and springs as the model says, as a share of it
 MODEL_FRICTION, MODEL_SPRING = 0.08, 0.02
-STICK_SLIP = 0.2  # the same of friction, of a stem that only sticks and slips
+STICK_SLIP = 0.15  # the same of friction, of a stem that only sticks and slips
 FRICTION_SIZE = np.array([SIGN, V, ONE])
 SPRING_SIZE = np.array([X1, ONE])
 ONE_WAY = 0.3  # of a friction change: how much more of it one way than on the mean
