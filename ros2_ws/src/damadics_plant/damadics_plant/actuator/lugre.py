@@ -14,6 +14,7 @@ import numpy as np
 from damadics_fd.core.jit import jit
 from damadics_fd.core.record import Floats, Record, Rows
 from damadics_fd.core.valve.flow import vapour_pressure
+from damadics_fd.core.valve.parameters import Valve
 from damadics_fd.core.valve.pneumatics import ATMOSPHERE, air_flow, set_point_filter, transducer
 
 from damadics_plant.actuator.measure import measure
@@ -26,6 +27,9 @@ RATE = 200.0
 
 SUBSTEP = 1e-3
 """Longest substep [s]."""
+
+NOMINAL = Valve().stroke
+"""Stroke of the benchmark's valve, for which the lever of the positioner was made [m]."""
 
 JERK = 0.01
 """Change of velocity in a substep beyond which the substep is done again in four [m/s]."""
@@ -147,7 +151,7 @@ def _substep(s: State, a: Constants, e: Effects, dp: float, h: float) -> None:
         s.x, s.v = e.stop, 0.0
     else:
         s.x, s.v, s.z = x, v, z
-    s.ma = min(max(s.ma + h * flow, 1e-9), 0.1)
+    s.ma = max(s.ma + h * flow, 1e-9)
 
 
 @jit
@@ -178,6 +182,7 @@ def simulate_block(
     s, a, e = state[0], constants[0], effects[0]
     substeps = int(math.ceil(1.0 / (rate * SUBSTEP) - 1e-9))
     h = 1.0 / (rate * substeps)
+    longer = a.stroke / NOMINAL
     q = h / a.lag
     decay = math.exp(-q)
     for i in range(inputs.shape[1]):
@@ -198,7 +203,7 @@ def simulate_block(
         for _ in range(substeps):
             update_effects(faults, (s.substep + 0.5) * h, f, a, e, True)
             fed_back = min(max(s.x * e.position, -0.25 * a.stroke), 1.25 * a.stroke)
-            fed_back = min(max(fed_back, -0.01), 0.05)
+            fed_back = min(max(fed_back, -0.01 * longer), 0.05 * longer)  # reach of the lever
             s.xb = min(max(s.xb, fed_back - 0.5 * e.feedback), fed_back + 0.5 * e.feedback)
             if s.substep * h >= s.held * a.hold - 1e-9:
                 s.e = transducer(s.y2, s.xb / a.stroke, a.gain)

@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from damadics_fd.commands.commission.errors import CommissioningError
+from damadics_fd.commands.commission.lag import plug_per_pascal
 from damadics_fd.commands.commission.monitor import Proposal
-from damadics_fd.commands.commission.regression import regressor
 from damadics_fd.commands.commission.signals import Blocks, Signals, blocks, gather
 from damadics_fd.commands.commission.valve_file import rows
 from damadics_fd.core.approximator.transmitter import delay_column
@@ -29,7 +29,8 @@ ANSWER, DEAD = 0.25, 0.02  # time constants, and s, until the air answers
 LEAST_DRIVE = 3e4  # Pa
 BRISTLE = 2e-5  # m by which the stem gives before it breaks away
 STRIBECK = 1e-3  # m/s
-UNLIKE = 0.1  # of the air's movement: a positioner that leaves more is another one
+UNLIKE = 0.035  # of the air's movement: a positioner that leaves more is another one
+AWAY = 4.0  # deviations of the noise by which a stem has left its place
 HUNTING = 0.03  # of the stroke, about the set-point
 ENOUGH = 200  # blocks after steps of the command, that are judged alone
 REACH = 12.0  # lags after which a step is over
@@ -89,7 +90,7 @@ def twin(proposal: Proposal) -> dict[str, float]:
         )
     signals = gather([FaultFree('all', proposal.columns)])
     fine = blocks(signals, FINE, s.ps_lag)
-    static = max(breakaway(proposal, blocks(signals, SHORT, s.ps_lag)), b.friction)
+    static = max(breakaway(signals, s), b.friction)
     air = air_path(signals, s)
     if air is None:
         fill, vent = capacities(fine, s)
@@ -138,24 +139,45 @@ def operation(proposal: Proposal) -> dict[str, float]:
     return {name: float(f'{value:.4g}') for name, value in found.items()}
 
 
-def breakaway(proposal: Proposal, b: Blocks) -> float:
+def breakaway(signals: Signals, s: Settings) -> float:
     """
     Return the friction that the stem overcomes when it begins to move.
 
-    :param proposal: what commission found.
-    :param b: blocks, delayed as the settings say.
+    While it stands the force rises by itself; a line through the last tenth of a second tells
+    what it was when the stem left its place.
+
+    :param signals: the samples.
+    :param s: settings with what commission found.
     :return: [N], the median over the strokes; 0 where none began in mid-stroke.
     """
-    s = proposal.settings
-    force, _, _ = regressor(b, s)
-    left = force - s.stiffness * s.stroke * (b.x + s.spring_origin)
-    begins = np.flatnonzero(b.standing[:-2] & b.moving[2:] & (b.index[2:] - b.index[:-2] == 2))
-    if not len(begins):
-        return 0.0
-    # the stem breaks away within the block after, so the most is borne in either of the two
-    way = np.sign(b.v[begins + 2])
-    borne = np.maximum(left[begins] * way, left[begins + 1] * way)
-    return float(max(np.median(borne), 0.0))
+    b = blocks(signals, SHORT, s.ps_lag)
+    x, dp = signals.x, signals.dp
+    if s.ps_lag > 0.0:
+        dt = np.diff(signals.t, prepend=-np.inf)
+        x, dp = delay_column(x, dt, s.ps_lag), delay_column(dp, dt, s.ps_lag)
+    noise = 1.4826 * float(np.median(np.abs(np.diff(x, 3)))) / np.sqrt(20.0)
+    borne = []
+    whole = b.index[2:] - b.index[:-2] == 2
+    for k in np.flatnonzero(b.standing[:-2] & b.moving[2:] & whole):
+        first, last = np.searchsorted(signals.t, b.t[k] + np.array([-1.5, 2.5]) * SHORT)
+        t, xs = signals.t[first:last], x[first:last]
+        still = t < b.t[k]
+        if np.ptp(t) > 5.0 * SHORT or still.sum() < 4:
+            continue
+        place, way = float(np.mean(xs[still])), float(np.sign(b.v[k + 2]))
+        away = (xs - place) * way > AWAY * noise
+        left = int(np.argmax(away & np.roll(away, -1)))
+        before = (t < t[left] - 0.1 * SHORT) & (t >= t[left] - 2.0 * SHORT)
+        if left == 0 or before.sum() < 4:
+            continue
+        plug = float(plug_per_pascal(s, np.array([place]))[0]) * dp[first:last]
+        force = s.mass * s.gravity + s.signed_area * signals.ps[first:last]
+        force -= (plug if s.flow_to == 'open' else -plug) + s.stiffness * s.stroke * (
+            place + s.spring_origin
+        )
+        line = np.polyfit(t[before] - t[left], force[before], 1)
+        borne.append(float(line[1]) * way)
+    return max(float(np.median(borne)), 0.0) if borne else 0.0
 
 
 class AirPath(NamedTuple):

@@ -98,4 +98,5 @@ def precision(s: State, m: int, eps: float) -> float:
     :return: [1].
     """
     sigma2 = s.sigma * s.sigma
-    return 1.0 / (sigma2 * max(1.0, eps * eps * s.rr[m] / (sigma2 * s.ne[m])))
+    iv: float = 1.0 / (sigma2 * max(1.0, eps * eps * s.rr[m] / (sigma2 * s.ne[m])))
+    return iv
