@@ -16,6 +16,7 @@ from pathlib import Path
 
 from asyncua import Server, ua
 from asyncua.crypto.permission_rules import SimpleRoleRuleset, User, UserRole
+from asyncua.server.internal_session import InternalSession
 from asyncua.server.user_managers import UserManager
 
 SIGNALS = ('CV', 'PV', 'P1', 'P2', 'T1', 'FLOW', 'PS')
@@ -38,6 +39,22 @@ class OneUser(UserManager):
         return None
 
 
+def take_at_most(most: int) -> None:
+    """Refuse a request that has more items than a server takes, as small controllers do."""
+    for service, items in (('create_monitored_items', 'ItemsToCreate'), ('read', 'NodesToRead')):
+
+        async def limited(session, given, inner=getattr(InternalSession, service), items=items):
+            if len(getattr(given, items)) > most:
+                raise ua.UaStatusCodeError(ua.StatusCodes.BadTooManyOperations)
+            return await inner(session, given)
+
+        setattr(InternalSession, service, limited)
+
+
+async def refuse(*_) -> None:
+    raise ua.UaStatusCodeError(ua.StatusCodes.BadServiceUnsupported)
+
+
 async def main() -> None:
     p = argparse.ArgumentParser()
     p.add_argument('port', type=int)
@@ -46,6 +63,8 @@ async def main() -> None:
     p.add_argument('--fast', type=int, default=0, help='further valves that change at 50 Hz')
     p.add_argument('--signals', type=int, default=7, help='of each valve that change')
     p.add_argument('--behind', type=float, default=0.0, help='share of time it falls behind by')
+    p.add_argument('--at-once', type=int, default=0, help='most items of one request')
+    p.add_argument('--always-report', action='store_true', help='has no SetMonitoringMode')
     p.add_argument('--user', action='store_true')
     p.add_argument('--certificates', type=Path)
     options = p.parse_args()
@@ -72,6 +91,18 @@ async def main() -> None:
         node = await judged.add_variable(f'ns={space};s=FD.{name}', name, value, kind)
         if name != 'LOCKED':
             await node.set_writable()
+    if options.at_once:
+        take_at_most(options.at_once)
+        ids = ua.ObjectIds
+        for limit in (
+            ids.Server_ServerCapabilities_OperationLimits_MaxMonitoredItemsPerCall,
+            ids.Server_ServerCapabilities_OperationLimits_MaxNodesPerRead,
+        ):
+            await server.get_node(ua.NodeId(limit)).write_value(
+                options.at_once, ua.VariantType.UInt32
+            )
+    if options.always_report:
+        InternalSession.set_monitoring_mode = refuse
     # let it lie about types, as some servers do
     server.iserver.aspace._is_expected_variant_type = lambda *given: True
     write = server.iserver.aspace.write_attribute_value

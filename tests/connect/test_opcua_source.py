@@ -185,6 +185,20 @@ def test_a_server_that_is_read_gives_the_same_samples(connect, serve):
     assert (np.diff(stamps(c.samples['lv0'])) > 0).all()
 
 
+@pytest.mark.parametrize(
+    ('limits', 'poll'),
+    [(('--at-once', '10'), False), (('--at-once', '10'), True), (('--always-report',), False)],
+)
+def test_a_server_that_takes_little_at_once_is_asked_for_less(connect, serve, limits, poll):
+    server = serve(3, *limits)
+    valves = {f'lv{n}': valve(n) for n in range(3)}
+    c = connect({'server': url(server), 'poll': poll, 'period': 0.2, 'valves': valves})
+    assert c.wait(lambda: all(len(got) > 2 for got in c.samples.values())), c.log()
+    assert not any(math.isnan(got[0].flow) for got in c.samples.values())
+    server.tell('LV2.PV 0.75 Double 0 -')
+    assert c.wait(lambda: c.samples['lv2'][-1].x1 == 0.75)
+
+
 def test_many_valves_in_blocks_every_change_with_its_time(connect, serve, processes):
     server = serve(20, '--rate', '1', '--fast', '2')
     valves = {f'lv{n}': valve(n, period=1.0 if n < 20 else 0.02) for n in range(22)}

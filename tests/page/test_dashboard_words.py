@@ -10,9 +10,9 @@ from alarm_events import event
 from damadics_dashboard.dashboard import main as dashboard
 from damadics_dashboard.live.trend_points import TrendPoints
 from damadics_dashboard.live.valve import Valve
+from damadics_dashboard.pages.charts import time_plot
 from damadics_dashboard.pages.fleet_page import tile
 from damadics_dashboard.pages.playback import Truth
-from damadics_dashboard.pages.plots import time_plot
 from damadics_dashboard.pages.replay_page import truth_words
 from damadics_dashboard.pages.valve.trend_card import points_of
 from damadics_dashboard.report.content import Sources, valve_report

@@ -2,7 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where the broker is and how it is entered."""
 
+import asyncio
 import ssl
+import time
 from pathlib import Path
 from typing import NamedTuple
 from urllib.parse import urlsplit
@@ -10,10 +12,14 @@ from urllib.parse import urlsplit
 from aiomqtt import Client, Will
 
 from damadics_connect.settings import Secret, Section
+from damadics_connect.source_clock import NANO
 
 SCHEMES = {'mqtt': 1883, 'mqtts': 8883}
 KEEP_ALIVE = 2  # s: a network that is gone is known within three of them
 PATIENCE = 5.0  # s for an answer
+QUIET = 1.6  # s without an answer after which the broker counts as gone
+PULSE = 0.25  # s between an answer and the next question
+NOWHERE = 'damadics/nowhere'  # a topic that nobody has subscribed to
 PAUSES = (0.2, 0.5, 1.0, 2.0, 5.0)  # s before a lost broker is tried again
 REMEDIES = {
     4: 'wrong user name or password',
@@ -60,6 +66,37 @@ class Broker(NamedTuple):
             timeout=PATIENCE,
             tls_context=context,
         )
+
+
+class Pulse:
+    """
+    Asks a broker, again and again, for what changes nothing: to end a subscription that is none.
+
+    Every broker answers that, whatever a user may publish or read there, and after the messages
+    that it had before the question. A network that is gone is known so before the connection is.
+    """
+
+    def __init__(self) -> None:
+        self.known = 0  # up to when all messages have come, on a clock that nobody sets [ns]
+
+    @property
+    def silent(self) -> bool:
+        """Whether the broker has not answered for longer than it may."""
+        return time.monotonic_ns() - self.known > (QUIET + PULSE) * NANO
+
+    async def keep(self, client: Client) -> None:
+        """
+        Ask until cancelled.
+
+        :param client: connected.
+        :raises MqttError: where there is no answer for `PATIENCE`.
+        """
+        self.known = time.monotonic_ns()
+        while True:
+            asked = time.monotonic_ns()
+            await client.unsubscribe(NOWHERE)
+            self.known = asked
+            await asyncio.sleep(PULSE)
 
 
 def read_broker(config: Section) -> Broker:

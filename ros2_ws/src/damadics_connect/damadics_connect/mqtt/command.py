@@ -54,7 +54,8 @@ async def connect(path: Path, ros_args: list[str]) -> int:
     try:
         from damadics_connect.mqtt.broker import read_broker
         from damadics_connect.mqtt.edge_node import EdgeNode
-        from damadics_connect.mqtt.incoming import UNITS, Incoming
+        from damadics_connect.mqtt.incoming import Incoming
+        from damadics_connect.mqtt.json_sample import UNITS
         from damadics_connect.mqtt.outgoing import Outgoing
     except ModuleNotFoundError as problem:
         raise ConnectError(MISSING) from problem

@@ -3,11 +3,9 @@
 """Samples in: JSON objects and Sparkplug B devices, from the topics of a broker."""
 
 import asyncio
-import contextlib
 import math
 import time
 from collections.abc import Callable, Sequence
-from datetime import datetime
 from functools import partial
 
 from aiomqtt import Client, Message, MqttError
@@ -16,8 +14,16 @@ from damadics_fd.ros.diagnostics import Report
 
 from damadics_connect.health import report
 from damadics_connect.joining import Joiner
-from damadics_connect.mqtt.broker import PAUSES, Broker, why
-from damadics_connect.mqtt.json_sample import field_at, limited, number_or_word, parsed
+from damadics_connect.mqtt.broker import PAUSES, QUIET, Broker, Pulse, why
+from damadics_connect.mqtt.json_sample import (
+    LATEST,
+    UNITS,
+    field_at,
+    limited,
+    number_or_word,
+    parsed,
+    stamp_of,
+)
 from damadics_connect.mqtt.sparkplug import (
     NAMESPACE,
     REBIRTH,
@@ -29,8 +35,6 @@ from damadics_connect.publishing import Output
 from damadics_connect.source_clock import NANO
 from damadics_connect.valve_list import ValveSource
 
-UNITS = {'s': NANO, 'ms': 1_000_000, 'us': 1000, 'ns': 1}
-LATEST = 2**62  # ns
 AGAIN = 5.0  # s between two requests for a birth certificate
 
 
@@ -122,13 +126,17 @@ class Incoming:
         now = time.monotonic_ns()
         for valve in self._all.values():
             valve.joiner.begin(now)
-        topics = set()
+        self._sequence.clear()
+        self._asked.clear()
+        topics, edges = set(), set()
         for topic in self._valves:
-            parts = topic.split('/')
-            if parts[0] == NAMESPACE:
+            space, *parts = topic.split('/')
+            if space == NAMESPACE:
+                group, node, device = parts
+                edges.add((group, node))
                 topics |= {
-                    f'{NAMESPACE}/{parts[1]}/+/{parts[2]}/{parts[3]}',
-                    f'{NAMESPACE}/{parts[1]}/+/{parts[2]}',
+                    f'{NAMESPACE}/{group}/+/{node}/{device}',
+                    f'{NAMESPACE}/{group}/+/{node}',
                 }
             else:
                 topics.add(topic)
@@ -136,29 +144,57 @@ class Incoming:
             await client.subscribe(topic, qos=1)
         self._fault = ''
         self._log(f'connected to {self._broker.shown}: {len(self._all)} valve(s)')
-        held = asyncio.create_task(self._hold())
+        for group, node in sorted(edges):  # a device at rest says nothing by itself
+            await self._ask_for_birth(client, group, node)
+        pulse = Pulse()
+        jobs = [
+            asyncio.create_task(job)
+            for job in (self._take(client), pulse.keep(client), self._hold(pulse))
+        ]
         try:
-            async for message in client.messages:
-                self._messages += 1
-                if str(message.topic).startswith(f'{NAMESPACE}/'):
-                    await self._take_sparkplug(client, message)
-                else:
-                    self._take_json(message)
-                self._output.flush()
+            done, _ = await asyncio.wait(jobs, return_when=asyncio.FIRST_COMPLETED)
+            for job in done:
+                job.result()
         finally:
-            held.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await held
+            for job in jobs:
+                job.cancel()
+            await asyncio.gather(*jobs, return_exceptions=True)
 
-    async def _hold(self) -> None:
-        """Hold what does not change, for devices that tell when they die."""
+    async def _take(self, client: Client) -> None:
+        """Take what comes."""
+        async for message in client.messages:
+            self._messages += 1
+            if str(message.topic).startswith(f'{NAMESPACE}/'):
+                await self._take_sparkplug(client, message)
+            else:
+                self._take_json(message)
+            self._output.flush()
+
+    async def _hold(self, pulse: Pulse) -> None:
+        """
+        Hold what does not change, for devices that tell when they die.
+
+        The broker tells it on their behalf: what it has not said up to its last answer is not
+        known, and where it is silent nothing is made up.
+        """
         while True:
             await asyncio.sleep(0.05)
+            self._tell_silence(pulse.silent)
             now = time.monotonic_ns()
             for valve in self._all.values():
                 if valve.alive:
-                    valve.joiner.look(now)
+                    valve.joiner.look(now, pulse.known)
             self._output.flush()
+
+    def _tell_silence(self, silent: bool) -> None:
+        if silent and not self._fault:
+            self._fault = (
+                f'{self._broker.shown}: silent for {QUIET:g} s and more: broker or network is gone'
+            )
+            self._log(f'not connected: {self._fault}')
+        elif self._fault and not silent:
+            self._fault = ''
+            self._log(f'connected to {self._broker.shown} again')
 
     def _take_json(self, message: Message) -> None:
         """Take one sample: a field that is not there is not measured."""
@@ -192,24 +228,7 @@ class Incoming:
         if given is None:
             self._unstamped += 1
             return time.time_ns()
-        try:
-            if unit == 'iso':
-                when = datetime.fromisoformat(str(given))
-                if when.tzinfo is None:
-                    raise ValueError
-                stamp = round(when.timestamp() * 1e6) * 1000
-            elif isinstance(given, bool) or not isinstance(given, int | float):
-                raise ValueError
-            elif isinstance(given, int):
-                stamp = given * UNITS[unit]
-            else:
-                stamp = round(given * UNITS[unit])
-        except (ValueError, OverflowError):
-            wanted = 'ISO 8601 with a time zone' if unit == 'iso' else f'a number in {unit}'
-            raise ValueError(f'{field} is not {wanted}') from None
-        if not 0 < stamp < LATEST:
-            raise ValueError(f'{field} is out of range for {unit}')
-        return stamp
+        return stamp_of(given, field, unit)
 
     async def _take_sparkplug(self, client: Client, message: Message) -> None:
         """Take one message of an edge node or one of its devices."""

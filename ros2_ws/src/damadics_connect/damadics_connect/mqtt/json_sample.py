@@ -4,12 +4,16 @@
 
 import json
 import math
+from datetime import datetime
 
 from damadics_fd.core.text import NAME, plain
 
 from damadics_connect.mqtt.sparkplug import PayloadError
+from damadics_connect.source_clock import NANO
 
 LARGEST = 1_000_000  # bytes of a message
+UNITS = {'s': NANO, 'ms': 1_000_000, 'us': 1000, 'ns': 1}
+LATEST = 2**62  # ns
 
 
 def limited(payload: object) -> bytes:
@@ -54,3 +58,33 @@ def number_or_word(value: object) -> float | str:
         return float(value)
     except OverflowError:
         return 'a number that is too large'
+
+
+def stamp_of(given: object, field: str, unit: str) -> int:
+    """
+    Read the source time of a message.
+
+    :param given: its value.
+    :param field: its name.
+    :param unit: one of `UNITS`, or `iso` for a text.
+    :return: [ns since 1970].
+    :raises ValueError: where it is no time; says what is wanted.
+    """
+    try:
+        if unit == 'iso':
+            when = datetime.fromisoformat(str(given))
+            if when.tzinfo is None:
+                raise ValueError
+            stamp = round(when.timestamp() * 1e6) * 1000
+        elif isinstance(given, bool) or not isinstance(given, int | float):
+            raise ValueError
+        elif isinstance(given, int):
+            stamp = given * UNITS[unit]
+        else:
+            stamp = round(given * UNITS[unit])
+    except (ValueError, OverflowError):
+        wanted = 'ISO 8601 with a time zone' if unit == 'iso' else f'a number in {unit}'
+        raise ValueError(f'{field} is not {wanted}') from None
+    if not 0 < stamp < LATEST:
+        raise ValueError(f'{field} is out of range for {unit}')
+    return stamp

@@ -86,14 +86,15 @@ class Feed:
         """Whether the server speaks so often that held values can wait for its word."""
         return self.patience <= 1.5 * self.word
 
-    def begin(self, now: int) -> None:
+    def begin(self, now: int, patience: float = 0.0) -> None:
         """
         Begin a session.
 
         :param now: monotonic time [ns].
+        :param patience: time after which the server always says something [s]; 0: as asked for.
         """
         self.heard = now / NANO
-        self.patience = self.word
+        self.patience = patience or self.word
         self._horizon.begin(now)
         for joiner in self.joiners.values():
             joiner.begin(now)

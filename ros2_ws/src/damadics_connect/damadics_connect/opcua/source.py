@@ -15,6 +15,13 @@ from damadics_connect.health import report, some
 from damadics_connect.opcua.feed import Feed, Item, Options
 from damadics_connect.opcua.node_ids import nanoseconds_of, node_of
 from damadics_connect.opcua.session import Connection, Endpoint, SessionError
+from damadics_connect.opcua.subscribing import (
+    Limits,
+    Made,
+    limits_of,
+    report_from_now,
+    subscribe,
+)
 from damadics_connect.opcua.wire import Changes, WireError, read_changes
 from damadics_connect.publishing import Output
 from damadics_connect.valve_list import ValveSource
@@ -23,9 +30,7 @@ HELD_UP = 0.5  # s that our own process may be late before its lateness counts
 QUIET = 1.6  # s without a word, beside its usual time, after which the server counts as gone
 GIVE_UP = 5.0  # s without a word after which the session is ended: until then it may go on, and
 # what the server has kept of its changes with it
-AT_ONCE = 1000  # monitored items of one request
-CANNOT_SUBSCRIBE = (ua.uaerrors.BadServiceUnsupported, ua.uaerrors.BadNotImplemented)
-BAD = 0x80000000
+CANNOT = (ua.uaerrors.BadServiceUnsupported, ua.uaerrors.BadNotImplemented)
 Log = Callable[[str], None]
 
 
@@ -50,6 +55,7 @@ class Source:
     ) -> None:
         self._connection = Connection(endpoint, self._follow, log, 'not connected')
         self._poll = options.poll
+        self._resting = True  # items report once all of them are there
         self._output = output
         self._log = log
         by_period: dict[float, dict[int, ValveSource]] = {}
@@ -87,11 +93,21 @@ class Source:
         self._ended = False
         self._unknown.clear()
         spaces = await client.get_namespace_array()
-        polled = []
+        limits = await limits_of(client)
+        made: dict[Feed, Made] = {}
         for feed in self._feeds:
             feed.begin(time.monotonic_ns())
-            if self._poll or not await self._subscribe(client, feed, spaces):
-                polled.append(asyncio.create_task(self._read_on(client, feed, spaces)))
+            subscription = None
+            if not self._poll:
+                subscription = await self._subscribe(client, feed, spaces, limits)
+            if subscription is not None:
+                made[feed] = subscription
+        polled = [
+            asyncio.create_task(self._read_on(client, feed, spaces, limits.reads))
+            for feed in self._feeds
+            if feed not in made
+        ]
+        await self._report(client, made, limits)
         for feed in self._feeds:
             feed.heard = time.monotonic()  # while they were made, nobody spoke
         self._connection.works()
@@ -141,54 +157,41 @@ class Source:
             connection.works()
             self._log(f'connected to {connection.place} again')
 
-    async def _subscribe(self, client: Client, feed: Feed, spaces: list[str]) -> bool:
-        """Make the subscription of a feed; False where the server has none."""
-        parameters = ua.CreateSubscriptionParameters(
-            RequestedPublishingInterval=1000.0 * feed.interval,
-            RequestedMaxKeepAliveCount=max(1, round(feed.word / feed.interval)),
-            RequestedLifetimeCount=max(30, round(30.0 / feed.interval)),
-            MaxNotificationsPerPublish=0,
-            PublishingEnabled=True,
-        )
-        session = client.uaclient.session
+    async def _subscribe(
+        self, client: Client, feed: Feed, spaces: list[str], limits: Limits
+    ) -> Made | None:
+        """Make the subscription of a feed; None where the server has none."""
+
+        def without(handle: int, cause: str) -> None:
+            self._without(feed.items[handle], feed.nodes[handle], cause)
+
         try:
-            created = await session.create_subscription(parameters, partial(self._take, feed))
-        except CANNOT_SUBSCRIBE:
+            return await subscribe(
+                client,
+                feed,
+                spaces,
+                limits.items,
+                partial(self._take, feed),
+                without,
+                resting=self._resting,
+            )
+        except CANNOT:
             self._log('the server has no subscriptions: its values are read')
-            return False
-        feed.patience = created.RevisedPublishingInterval * created.RevisedMaxKeepAliveCount / 1e3
-        requests = []
-        for handle, (item, node) in enumerate(zip(feed.items, feed.nodes, strict=True)):
-            nodeid = node_of(node, spaces)
-            if nodeid is None:
-                self._without(item, node, 'not a node id such as ns=2;s=NAME')
-                continue
-            requests.append(
-                ua.MonitoredItemCreateRequest(
-                    ItemToMonitor=ua.ReadValueId(NodeId=nodeid, AttributeId=ua.AttributeIds.Value),
-                    MonitoringMode=ua.MonitoringMode.Reporting,
-                    RequestedParameters=ua.MonitoringParameters(
-                        ClientHandle=handle,
-                        SamplingInterval=1000.0 * min(feed.period / 2.0, feed.interval),
-                        QueueSize=feed.queue,
-                        DiscardOldest=True,
-                    ),
-                )
-            )
-        for begin in range(0, len(requests), AT_ONCE):
-            some_of = requests[begin : begin + AT_ONCE]
-            results = await session.create_monitored_items(
-                ua.CreateMonitoredItemsParameters(
-                    SubscriptionId=created.SubscriptionId,
-                    TimestampsToReturn=ua.TimestampsToReturn.Both,
-                    ItemsToCreate=some_of,
-                )
-            )
-            for request, result in zip(some_of, results, strict=True):
-                if result.StatusCode.value & BAD:
-                    handle = request.RequestedParameters.ClientHandle
-                    self._without(feed.items[handle], feed.nodes[handle], result.StatusCode.name)
-        return True
+            return None
+
+    async def _report(self, client: Client, made: dict[Feed, Made], limits: Limits) -> None:
+        """Have all that was made report from now on."""
+        for feed in made:
+            feed.begin(time.monotonic_ns(), feed.patience)
+        if not self._resting:
+            return
+        try:
+            for subscription in made.values():
+                await report_from_now(client, subscription, limits.items)
+        except CANNOT:
+            self._resting = False
+            place = self._connection.place
+            raise SessionError(f'{place}: has no SetMonitoringMode; it is done without') from None
 
     def _without(self, item: Item, node: str, cause: str) -> None:
         item.joiner.without(item.slot)
@@ -222,17 +225,23 @@ class Source:
             feed.look(at)
         self._output.flush()
 
-    async def _read_on(self, client: Client, feed: Feed, spaces: list[str]) -> None:
+    async def _read_on(self, client: Client, feed: Feed, spaces: list[str], most: int) -> None:
         """Read the values of a feed once a period, for servers without subscriptions."""
         ids = [node_of(node, spaces) or ua.NodeId() for node in feed.nodes]
-        request = ua.ReadParameters(
-            TimestampsToReturn=ua.TimestampsToReturn.Both,
-            NodesToRead=[ua.ReadValueId(NodeId=i, AttributeId=ua.AttributeIds.Value) for i in ids],
-        )
+        wanted = [ua.ReadValueId(NodeId=i, AttributeId=ua.AttributeIds.Value) for i in ids]
+        requests = [
+            ua.ReadParameters(
+                TimestampsToReturn=ua.TimestampsToReturn.Both,
+                NodesToRead=wanted[begin : begin + most],
+            )
+            for begin in range(0, len(wanted), most)
+        ]
         feed.patience = feed.period
         due = time.monotonic()
         while True:
-            results = await client.uaclient.session.read(request)
+            results = []
+            for request in requests:
+                results += await client.uaclient.session.read(request)
             now = time.monotonic_ns()
             changes = Changes([], [], [], [], [])
             for handle, result in enumerate(results):

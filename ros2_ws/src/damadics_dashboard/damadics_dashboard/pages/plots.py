@@ -4,14 +4,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TypeAlias, TypedDict
+from typing import NamedTuple, TypeAlias, TypedDict
 
 import numpy as np
-from damadics_fd.core.record import Saved
 from damadics_fd.core.stamps import SECOND as NANO
 from nicegui import ui
 
 from damadics_dashboard.live.traces import Points, Trace, block_means, envelope
+from damadics_dashboard.pages.charts import Options
 from damadics_dashboard.pages.elements import box, tell, with_values
 
 BUCKETS = 240  # intervals across a plot: two points each at most, three pixels wide
@@ -22,20 +22,6 @@ SMALLEST = 1e-5  # 1/s; a logarithmic axis has no zero
 Area: TypeAlias = list[dict[str, float]]  # {'xAxis': begin}, {'xAxis': end} [s]
 
 
-class Options(TypedDict, total=False):
-    """Options of a chart, as ECharts names them."""
-
-    animation: bool
-    grid: Saved
-    legend: Saved
-    tooltip: Saved
-    axisPointer: Saved
-    dataZoom: list[Saved]
-    xAxis: Saved
-    yAxis: Saved | list[Saved]
-    series: list[Saved]
-
-
 News = TypedDict(  # what `damadics.push` takes for one chart; `from` is a word of Python
     'News',
     {
@@ -44,151 +30,18 @@ News = TypedDict(  # what `damadics.push` takes for one chart; `from` is a word 
         'series': Sequence[Points],
         'range': Sequence[float],
         'areas': list[Area],
+        'absent': bool,  # samples have come, but not one value of these curves
     },
     total=False,
 )
 
 
-def time_plot(
-    names: list[str],
-    unit: str,
-    *,
-    log: bool = False,
-    low: float | None = None,
-    high: float | None = None,
-    dashed: tuple[str, ...] = (),
-    bands: tuple[str, ...] = (),
-    right: tuple[str, ...] = (),
-) -> Options:
-    """
-    Return the options of a plot over time that can be zoomed and moved.
+class Notes(NamedTuple):
+    """What stands in place of curves."""
 
-    :param names: of the curves.
-    :param unit: of the ordinate.
-    :param log: logarithmic ordinate.
-    :param low: lower end of the ordinate, free if None.
-    :param high: upper end.
-    :param dashed: curves drawn dashed.
-    :param bands: curves drawn thin, as the edges of a band; the legend leaves them out.
-    :param right: curves with an ordinate of their own, on the right.
-    :return: ECharts options.
-    """
-    axis: Saved = {
-        'type': 'log' if log else 'value',
-        'name': unit,
-        'nameTextStyle': {'align': 'left'},
-        'nameGap': 10,
-        'scale': True,
-        'splitNumber': 4,
-        'axisPointer': {'show': False},
-    }
-    if low is not None:
-        axis['min'] = low
-    if high is not None:
-        axis['max'] = high
-        if low is not None:
-            axis['interval'] = (high - low) / 4.0
-    second: Saved = {**axis, 'nameTextStyle': {'align': 'right'}, 'splitLine': {'show': False}}
-    return {
-        'animation': False,
-        'grid': {'left': 54, 'right': 46 if right else 30, 'top': 34, 'bottom': 40},
-        'legend': {
-            'top': 0,
-            'right': 6,
-            'itemWidth': 16,
-            'itemHeight': 8,
-            'icon': 'roundRect',
-            'data': list(dict.fromkeys(name for name in names if name not in bands)),
-        },
-        'tooltip': {
-            'trigger': 'axis',
-            'axisPointer': {'type': 'line', 'label': {'show': True}},
-            'confine': True,
-        },
-        'axisPointer': {'show': True, 'type': 'line'},
-        'dataZoom': [
-            {
-                'type': 'inside',
-                'filterMode': 'none',
-                'zoomOnMouseWheel': 'ctrl',
-                'moveOnMouseWheel': False,
-                'preventDefaultMouseMove': False,
-            }
-        ],
-        'xAxis': {
-            'type': 'value',
-            'min': 0,
-            'max': 60,
-            'nameLocation': 'end',
-            'nameTextStyle': {'align': 'right', 'verticalAlign': 'top', 'padding': [24, 0, 0, 0]},
-            'nameGap': 0,
-            'axisLine': {'onZero': False},
-            'splitLine': {'show': False},
-        },
-        'yAxis': [axis, second] if right else axis,
-        'series': [
-            {
-                'type': 'line',
-                'name': name,
-                'data': [],
-                'yAxisIndex': int(name in right),
-                'showSymbol': False,
-                'emphasis': {'disabled': True},
-                'lineStyle': {
-                    'width': 1.0 if name in bands else 1.8,
-                    'opacity': 0.5 if name in bands else 1.0,
-                    'type': 'dashed' if name in dashed else 'solid',
-                    'cap': 'butt' if name in dashed else 'round',
-                },
-            }
-            for name in names
-        ],
-    }
-
-
-def signature_plot(names: tuple[str, ...], x: str, y: str) -> Options:
-    """
-    Return the options of the valve signature: force over position.
-
-    :param names: of the clouds, the fainter ones first.
-    :param x: name of the abscissa.
-    :param y: name of the ordinate.
-    :return: ECharts options.
-    """
-    return {
-        'animation': False,
-        'grid': {'left': 54, 'right': 16, 'top': 50, 'bottom': 40},
-        'legend': {'top': 0, 'right': 6, 'itemWidth': 10, 'itemHeight': 10, 'icon': 'circle'},
-        'tooltip': {'trigger': 'item', 'confine': True},
-        'xAxis': {
-            'type': 'value',
-            'name': x,
-            'nameLocation': 'middle',
-            'nameGap': 24,
-            'scale': True,
-            'splitNumber': 5,
-        },
-        'yAxis': {
-            'type': 'value',
-            'name': y,
-            'nameTextStyle': {'align': 'left'},
-            'nameGap': 10,
-            'scale': True,
-            'splitNumber': 5,
-        },
-        'series': [
-            {
-                'type': 'scatter',
-                'name': name,
-                'data': [],
-                'symbolSize': 4,
-                'large': True,
-                'emphasis': {'disabled': True},
-                'itemStyle': {'opacity': opacity},
-            }
-            for name, opacity in zip(names, (0.55, 0.9)[-len(names) :], strict=True)
-        ],
-    }
+    loading: str  # until the server has told of them
+    empty: str  # there are none yet
+    absent: str = ''  # there will be none: nobody measures this
 
 
 class Plot:
@@ -200,7 +53,7 @@ class Plot:
     :param label: what a screen reader says.
     :param style: CSS classes.
     :param group: charts of one name share zoom and cursor.
-    :param empty: shown while there is nothing to plot.
+    :param notes: shown where there is nothing to plot.
     """
 
     def __init__(
@@ -211,15 +64,20 @@ class Plot:
         style: str = 'plot',
         *,
         group: str = '',
-        empty: str = '',
+        notes: Notes | None = None,
     ) -> None:
         xy = options['series'][0]['type'] == 'scatter'
         with box('div', 'plot-box'):
             self.chart = ui.echart(dict(options)).classes(style)
             with_values(self.chart, role='img', aria_label=label)
-            if empty:
-                place = ui.label(empty).classes('plot-empty')
-                with_values(place, data_plot=self.chart.id)
+            if notes:
+                place = ui.label(notes.loading).classes('plot-note')
+                with_values(
+                    place,
+                    data_plot=self.chart.id,
+                    data_empty=notes.empty,
+                    data_absent=notes.absent or notes.empty,
+                )
         tell('register', self.chart.id, {'colors': colors, 'xy': xy, 'group': group})
 
     @property
@@ -298,6 +156,8 @@ class Feed:
         begin = max(end - int(self.window * NANO), first)
         message: dict[int, News] = {}
         for plot, curves in self.curves.items():
+            if not _told(curves):
+                continue
             everything = any(c.sent < begin for c in curves)
             if self._turn % self.every.get(plot, 1) and not everything:
                 continue
@@ -316,8 +176,22 @@ class Feed:
                 'from': starts,
                 'series': series,
                 'range': [begin * 1e-9, begin * 1e-9 + self.window],
+                'absent': all(c.trace.newest >= 0 for c in curves) and not any(series),
             }
         return message
+
+    def nothing(self) -> dict[int, News]:
+        """Return what `damadics.push` needs for plots of which no sample is to be expected."""
+        return {
+            plot: {'all': True, 'from': [], 'series': [[] for _ in curves]}
+            for plot, curves in self.curves.items()
+            if not _told(curves)
+        }
+
+
+def _told(curves: Sequence[Curve]) -> bool:
+    """Whether any sample of a plot has come."""
+    return any(curve.trace.newest >= 0 for curve in curves)
 
 
 def signature(trace: Trace, seconds: float) -> tuple[Points, Points]:

@@ -15,9 +15,10 @@ from nicegui import events, run, ui
 
 from damadics_dashboard.live.valve import NE107
 from damadics_dashboard.live.watcher import Watcher
+from damadics_dashboard.pages.charts import Options, signature_plot, time_plot
 from damadics_dashboard.pages.elements import box, markup, tell, with_values
 from damadics_dashboard.pages.frame import card, frame
-from damadics_dashboard.pages.plots import News, Options, Plot, signature_plot, time_plot
+from damadics_dashboard.pages.plots import News, Plot
 from damadics_dashboard.words.texts import Texts
 from damadics_dashboard.words.valve_words import cause_of, faults_of, history_rows
 

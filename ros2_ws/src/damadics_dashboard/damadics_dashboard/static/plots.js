@@ -128,7 +128,10 @@
     if (!entry.watched) watch(id, entry);
     const empty = entry.data.every((points) => !points.length);
     const place = document.querySelector(`[data-plot="${id}"]`);
-    if (place && entry.told) place.hidden = !empty;
+    if (place && entry.told) { // until then it says that it is loading
+      place.hidden = !empty;
+      place.textContent = entry.absent ? place.dataset.absent : place.dataset.empty;
+    }
     if (entry.hidden) { entry.late = true; return; }
     const option = { series: entry.data.map((points) => ({ data: points })) };
     if (entry.range && !entry.spec.xy) option.xAxis = axis(entry, chart);
@@ -195,7 +198,7 @@
     });
   }
 
-  // One message of the server: per chart {from, series, range, areas, all}. Points from `from` on
+  // One message of the server: per chart {from, series, range, areas, all, absent}. Points from `from` on
   // are replaced by the new ones, points before the range are dropped. A chart that a person has
   // zoomed into stands still; what comes meanwhile is kept.
   function push(message) {
@@ -206,6 +209,7 @@
       entry.told = true;
       if (part.range && (!entry.frozen || part.all)) entry.range = part.range;
       if (part.areas) entry.areas = part.areas;
+      entry.absent = part.absent;
       entry.data = entry.data.map((old, n) => {
         const fresh = part.series[n];
         if (!fresh) return old;

@@ -7,17 +7,10 @@ import math
 from nicegui import ui
 
 from damadics_dashboard.live.valve import Valve
+from damadics_dashboard.pages.charts import Options, signature_plot, time_plot
 from damadics_dashboard.pages.elements import box, markup, redraw
 from damadics_dashboard.pages.frame import card
-from damadics_dashboard.pages.plots import (
-    HALF,
-    SLOW,
-    Curve,
-    Options,
-    Plot,
-    signature_plot,
-    time_plot,
-)
+from damadics_dashboard.pages.plots import HALF, SLOW, Curve, Notes, Plot
 from damadics_dashboard.words.texts import Texts
 
 BAR = 1e-5  # bar per Pa
@@ -45,6 +38,7 @@ class Signals:
     def __init__(self, valve: Valve, t: Texts, recent: float) -> None:
         self._valve = valve
         self._t = t
+        self._notes = Notes(t('loading'), t('no_data_yet'), t('not_measured'))
         self.curves: dict[int, list[Curve]] = {}
         with box('div', 'stack'):
             self._position()
@@ -71,7 +65,7 @@ class Signals:
         return {self._velocities.id: HALF, self._pressures.id: SLOW, self._flows.id: SLOW}
 
     def _plot(self, curves: list[Curve], options: Options, colors: list[str], label: str) -> Plot:
-        plot = Plot(options, colors, label, group=GROUP, empty=self._t('no_data_yet'))
+        plot = Plot(options, colors, label, group=GROUP, notes=self._notes)
         self.curves[plot.id] = curves
         return plot
 
@@ -129,7 +123,7 @@ class Signals:
                 ['--before', '--now'],
                 t('signature_label'),
                 'plot tall',
-                empty=t('no_data_yet'),
+                notes=self._notes,
             )
 
     def _process(self) -> None:

@@ -10,9 +10,10 @@ from nicegui import ui
 
 from damadics_dashboard.live.traces import Points
 from damadics_dashboard.live.valve import Valve
+from damadics_dashboard.pages.charts import time_plot
 from damadics_dashboard.pages.elements import box, tell, with_values
 from damadics_dashboard.pages.frame import card
-from damadics_dashboard.pages.plots import Plot, time_plot
+from damadics_dashboard.pages.plots import Notes, Plot
 from damadics_dashboard.words.outlook import factor_of, outlook_words, unit_of
 from damadics_dashboard.words.texts import Texts
 
@@ -81,7 +82,7 @@ class TrendCard:
                 ),
                 COLORS[: len(names)],
                 t('trend_label'),
-                empty=t('no_trend_yet'),
+                notes=Notes(t('loading'), t('no_trend_yet')),
                 group='trend',
             )
 

@@ -95,7 +95,7 @@ class _Page:
         self._valve = valve
         self._t = t
         self._second = 0
-        self._paused = False
+        self._paused = self._stale = False
         self._head(window)
         self._banner = markup('banner.html', kind='off', title='', detail='', figures=[])
         self._banner.classes('w-full')
@@ -168,7 +168,8 @@ class _Page:
             return
         news = self._feed.news()
         if news is not None:
-            news[self._signals.residual.id]['areas'] = self._areas()
+            if residual := news.get(self._signals.residual.id):
+                residual['areas'] = self._areas()
             tell('push', news)
 
     def _areas(self) -> list[Area]:
@@ -191,7 +192,10 @@ class _Page:
         tell('age', None if old is None else round(old, 1))
         stale = condition.kind == 'off'
         self._grid.classes(add='stale' if stale else '', remove='' if stale else 'stale')
-        bare = all(trace.newest < 0 for trace in valve.traces.values())
+        bare = stale and all(trace.newest < 0 for trace in valve.traces.values())
+        if stale and not self._stale:  # until then what has not come is on its way
+            tell('push', self._feed.nothing())
+        self._stale = stale
         self._grid.classes(add='bare' if bare else '', remove='' if bare else 'bare')
         self._alarm_box.set_visibility(self._alarms.update() > 0)
         if self._watcher.offers(self._valve.name, 'inject_fault') != self._simulated:
@@ -210,7 +214,7 @@ class _Page:
             redraw(self._commission, 'commission.html', words=commission_words(told, self._t))
             if self._strokes is not None:
                 self._strokes.update()
-            if not self._paused:
+            if not self._paused and (stale or valve.traces['estimate'].newest >= 0):
                 self._draw_signature()
 
     def _banner_values(self, condition: Condition, now: float, clock: int) -> Banner:
