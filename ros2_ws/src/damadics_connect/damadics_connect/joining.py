@@ -71,6 +71,7 @@ class Joiner:
         self._known = 0  # signals that have a value since the session began
         self._group: list[tuple[int, float]] = []
         self._mask = 0
+        self._news = False  # the group has changes, not only first values of the session
         self._start = self._end = self._opened = 0
         self._last = 0  # stamp of the last sample
         self._sent_at = 0
@@ -103,6 +104,7 @@ class Joiner:
         :param now: [ns].
         """
         self._known = self._mask = 0
+        self._news = False
         self._group.clear()
         self._alive_since = now
         self._resumed = self._last > 0
@@ -165,6 +167,7 @@ class Joiner:
             self._opened = now
         self._group.append((slot, value))
         self._mask |= bit
+        self._news |= bool(self._known & bit)
         self._known |= bit
         self._times[slot] = stamp
         if stamp > self._end:
@@ -215,10 +218,15 @@ class Joiner:
             self._fill(start, now)
         for slot, value in self._group:
             self._values[slot] = value
+        news, self._news = self._news, False
         self._group.clear()
         self._mask = 0
         if self._first and late > self._period + self._settle:
-            return  # a value of long ago, as every session begins with: it is held from now on
+            if not news:
+                return  # of long ago, as every session begins with: it is held from now on
+            if self._clock.guessed:
+                self._clock.set(end, now)
+                late = 0
         if telling:
             self._clock.late(late, now)
         if end <= self._last:

@@ -242,3 +242,14 @@ def test_a_source_whose_clock_is_not_that_of_its_server(hours):
     for t in range(5, 10):
         rig.at(t, (CV, t), (X1, t), (P1, t), offset=off)
     assert rig.stamps[-5:] == [off + t * NANO for t in range(5, 10)]
+
+
+@pytest.mark.parametrize('late', [0.5, 30.0])
+def test_a_valve_that_is_read_as_often_as_it_changes_is_sampled_from_its_first_change(late):
+    rig = Rig(period=0.2, settle=0.35)
+    rig.joiner.source_clock(DAY0, rig.now)
+    off = DAY0 - int(late * NANO)
+    rig.joiner.take(P1, off - 3600 * NANO, 1e5, rig.now)  # it rests
+    for n in range(20):  # CV and X change between any two looks: a sample is always open
+        rig.at(0.2 * n, (CV, n), (X1, n), offset=off)
+    assert rig.stamps[:17] == [off + n * NANO // 5 for n in range(1, 18)]

@@ -10,6 +10,7 @@ from asyncua import Client, ua
 
 from damadics_connect.opcua.feed import Feed
 from damadics_connect.opcua.node_ids import node_of
+from damadics_connect.opcua.values import node_id
 
 AT_ONCE = 500  # monitored items of one request, so that each is answered in time
 AHEAD = 2  # requests on their way: while the server makes the items of one, we write the next
@@ -43,7 +44,7 @@ async def limits_of(client: Client) -> Limits:
     ids = ua.ObjectIds
     request = ua.ReadParameters(
         NodesToRead=[
-            ua.ReadValueId(NodeId=ua.NodeId(number), AttributeId=ua.AttributeIds.Value)
+            ua.ReadValueId(NodeId=node_id(number), AttributeId=ua.AttributeIds.Value)
             for number in (
                 ids.Server_ServerCapabilities_OperationLimits_MaxMonitoredItemsPerCall,
                 ids.Server_ServerCapabilities_OperationLimits_MaxNodesPerRead,
