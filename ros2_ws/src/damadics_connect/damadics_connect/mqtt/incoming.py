@@ -127,7 +127,6 @@ class Incoming:
         for valve in self._all.values():
             valve.joiner.begin(now)
         self._sequence.clear()
-        self._asked.clear()
         topics, edges = set(), set()
         for topic in self._valves:
             space, *parts = topic.split('/')
@@ -144,8 +143,10 @@ class Incoming:
             await client.subscribe(topic, qos=1)
         self._fault = ''
         self._log(f'connected to {self._broker.shown}: {len(self._all)} valve(s)')
+        self._asked.clear()
         for group, node in sorted(edges):  # a device at rest says nothing by itself
             await self._ask_for_birth(client, group, node)
+        self._asked.clear()  # whoever was not there to hear it is asked once more
         pulse = Pulse()
         jobs = [
             asyncio.create_task(job)
