@@ -224,6 +224,7 @@ def test_a_plot_tells_loading_from_no_data_and_from_not_measured(site, browser):
         'Flow',
     )
     assert [note(title) for title in titles] == ['Loading …'] * 4
+    assert 'Learned\n–' in page.locator('.banner').inner_text(), 'what is not known is not 0 %'
 
     def send() -> None:
         sample = Measurement(cv=0.5, x1=0.5, flow=math.nan)

@@ -226,6 +226,9 @@ class _Page:
             told = t('alarm_is', what=t('state_lost') if alarm.state == 'unknown' else what)
         ratio, monitored = max(valve.ratio, 0.0), condition.kind != 'off'
         heard = monitored or valve.period > 0.0
+        learned = heard and (
+            valve.progress > 0.0 or condition.kind == 'learn'
+        )  # else not told yet
         rate = f'{1.0 / valve.period:.0f}' if valve.period > 0.0 else DASH
         return {
             'kind': condition.kind,
@@ -240,7 +243,7 @@ class _Page:
                 ),
                 _figure(t('last_sample'), '–', t('ago'), aging=True),
                 _figure(t('samples'), rate, 'Hz' if valve.period > 0.0 else ''),
-                _figure(t('learned'), t.percent(valve.progress) if heard else DASH),
+                _figure(t('learned'), t.percent(valve.progress) if learned else DASH),
                 _figure(t('lost_samples'), str(valve.lost) if heard else DASH),
             ],
         }
