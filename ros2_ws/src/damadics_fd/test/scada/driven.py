@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Short records of a control room: the stated actuator, with faults of the benchmark."""
 
+import math
+
 import numpy as np
 from damadics_fd.core.scada.laws.actuator import F_RANGE, P_RANGE, T_RANGE, valve_flow
 from damadics_fd.core.scada.model import FAULTS, STEM, advance_stem, start_stem
@@ -12,13 +14,19 @@ NOISE = 0.0014
 
 
 def driven(
-    seconds: int, seed: int, at: int = 1 << 30, swing: float = 1.0, **faults: float
+    seconds: int,
+    seed: int,
+    at: int = 1 << 30,
+    swing: float = 1.0,
+    jump: float = math.nan,
+    **faults: float,
 ) -> np.ndarray:
     """
     Return rows t, CV, X', P1', P2', T1', F' at 1 Hz of a valve that its command moves.
 
     :param at: from when on the faults act [s]; f7: [K], f17: share of P1.
     :param swing: how much the command moves.
+    :param jump: of the command every 40 s, which is then held between samples.
     """
     rng = np.random.default_rng(seed)
     act = SETTINGS.record()['act'][0]
@@ -27,6 +35,9 @@ def driven(
         some[name] = strength
     t = np.arange(float(seconds))
     cv = 0.5 + swing * (0.25 * np.sin(2 * np.pi * 0.02 * t) + 0.1 * np.sin(2 * np.pi * 0.007 * t))
+    held = not math.isnan(jump)
+    if held:
+        cv = cv - jump * (t // 40 % 2)
     p1, p2 = np.full(seconds, 3.5e6), np.full(seconds, 2.6e6)
     t1 = np.full(seconds, 43.0)
     p1[at:] *= 1.0 - faults.get('f17', 0.0)
@@ -39,7 +50,17 @@ def driven(
         fault = some[0] if k >= at else none[0]
         before = max(k - 1, 0)
         x[k] = advance_stem(
-            stem[0], act, fault, k - 1.0, k, cv[before], cv[k], drop[before], drop[k], 0.0, 0.0
+            stem[0],
+            act,
+            fault,
+            k - 1.0,
+            k,
+            cv[before],
+            cv[before if held else k],
+            drop[before],
+            drop[k],
+            0.0,
+            0.0,
         )
         true = x[k] / (1.0 + 1.25 * fault.f13)
         offset = 0.2 * fault.f2 - 0.1 * fault.f3
@@ -61,3 +82,32 @@ def following(n: int, seed: int) -> np.ndarray:
     rows[:, 0], rows[:, 1] = t, cv
     rows[:, 2] = np.r_[cv[:1], cv[:1], cv[:-2]] + rng.normal(0.0, NOISE, n)
     return rows
+
+
+def late(cv: np.ndarray, seed: int, lag: float = 1.2, play: float = 0.006) -> np.ndarray:
+    """Return rows of a stem with dead time, lag, a limited rate and play, without the process."""
+    n, parts, dead = len(cv), 10, 4
+    rate = 0.2 / parts
+    x = np.empty(n)
+    at = held = cv[0]
+    for k in range(n):
+        x[k] = held
+        for part in range(parts):
+            command = cv[k] if part >= dead else cv[max(k - 1, 0)]
+            at += min(max((command - at) / (parts * lag), -rate), rate)
+            held = min(max(held, at - play / 2), at + play / 2)
+    rows = np.full((n, 7), np.nan)
+    rows[:, 0], rows[:, 1] = np.arange(float(n)), cv
+    rows[:, 2] = x + np.random.default_rng(seed).normal(0.0, NOISE, n)
+    return rows
+
+
+def wandering(n: int, seed: int) -> np.ndarray:
+    """Return a command that wanders slowly and never jumps."""
+    rng = np.random.default_rng(seed)
+    cv = np.empty(n)
+    level = 0.0
+    for k, kick in enumerate(rng.normal(size=n).tolist()):
+        level = 0.998 * level + 0.0065 * kick
+        cv[k] = 0.5 + level
+    return np.clip(cv, 0.0, 1.0)

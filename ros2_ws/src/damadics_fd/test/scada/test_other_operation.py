@@ -13,7 +13,7 @@ from damadics_fd.core.scada.learning import learn
 from damadics_fd.core.scada.monitor import ScadaMonitor
 from damadics_fd.core.scada.state import MONITOR, REFERENCE
 
-from .driven import NOISE, SETTINGS, driven, following
+from .driven import NOISE, SETTINGS, driven, following, late, wandering
 
 T, CV, X, P1, P2, T1, F = range(7)
 FALL = 0.04  # of the stroke a second
@@ -51,6 +51,13 @@ def test_a_command_that_is_held_between_samples_is_seen_to_be():
     assert law['hold']
     assert law['fall'] == pytest.approx(FALL, rel=0.15)
     assert fit.sigma < 0.006, 'a CV along straight lines leaves 0.014'
+
+
+@pytest.mark.parametrize(('jump', 'shown'), [(0.0, False), (0.2, True)])
+def test_a_record_without_jumps_of_cv_does_not_tell_that_later_ones_can_be_judged(jump, shown):
+    [reference] = learn(driven(270, seed=31, jump=jump), SETTINGS)
+    assert reference['hold']
+    assert (reference['cv_jump'] > 1.0) == shown  # CV is 0..1
 
 
 def test_a_stem_with_more_air_than_on_the_learned_day_is_no_fault():
@@ -103,3 +110,36 @@ def test_a_stem_at_rest_shows_its_friction_once(moves, friction):
         weigh_friction(s, ref)
         largest = max(largest, float(s.llr))
     assert (largest >= ref.llr_limit) == friction
+
+
+def test_steps_of_cv_that_were_not_learned_are_no_fault():
+    reference = learn(late(wandering(1800, 1), 1), SETTINGS, math.inf)
+    cv = wandering(HOUR, 2) + 0.3 * (np.arange(HOUR) // 400 % 2) - 0.15
+    trace = ScadaMonitor(SETTINGS, reference).run_samples(late(cv, 2))
+    assert not trace['alarm'].any(), trace['t'][trace['alarm']][:1]
+    stuck = late(cv[:1300], 3)
+    stuck[1195:, X] = stuck[1194, X]  # five seconds before a step
+    trace = ScadaMonitor(SETTINGS, reference).run_samples(stuck)
+    assert 1195 <= trace['t'][trace['alarm']][0] <= 1220
+
+
+def test_a_stem_that_rests_within_its_play_is_no_fault_and_one_beside_it_is():
+    reference = learn(late(wandering(1800, 1), 1, lag=3.0, play=0.024), SETTINGS, math.inf)
+    cv = wandering(2 * HOUR, 2)
+    for begin in range(600, 2 * HOUR, 1200):
+        cv[begin : begin + 900] = cv[begin]
+    rows = late(cv, 2, lag=3.0, play=0.024)
+    trace = ScadaMonitor(SETTINGS, reference).run_samples(rows)
+    assert not trace['alarm'].any(), trace['t'][trace['alarm']][:1]
+    rows[3000:, X] += 0.04
+    trace = ScadaMonitor(SETTINGS, reference).run_samples(rows)
+    assert 3000 <= trace['t'][trace['alarm']][0] <= 3060
+
+
+def test_a_record_that_stood_still_goes_on_elsewhere():
+    reference = learn(late(wandering(1800, 1), 1), SETTINGS, math.inf)
+    rows = late(wandering(HOUR, 2), 2)
+    for begin in range(600, HOUR, 300):
+        rows[begin : begin + 150, 1:] = rows[begin, 1:]
+    trace = ScadaMonitor(SETTINGS, reference).run_samples(rows)
+    assert not trace['alarm'].any(), trace['t'][trace['alarm']][:1]

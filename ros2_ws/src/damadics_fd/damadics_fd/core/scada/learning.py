@@ -8,13 +8,19 @@ import numpy as np
 
 from damadics_fd.core.scada.judging.cusum import R1
 from damadics_fd.core.scada.judging.gap import GAP_PERIODS
-from damadics_fd.core.scada.judging.limits import friction_limit, is_stationary, set_limits
+from damadics_fd.core.scada.judging.limits import (
+    friction_limit,
+    is_stationary,
+    set_limits,
+    wander_of,
+)
 from damadics_fd.core.scada.judging.pressure import learn_pressure
 from damadics_fd.core.scada.judging.roughness import usual_roughness
 from damadics_fd.core.scada.laws.choose_flow import choose_flow, slow_sigma
 from damadics_fd.core.scada.laws.clean import (
     despiked,
     is_regular,
+    longest_repeat,
     period_of,
     spike_sizes,
     split,
@@ -85,6 +91,7 @@ def learn(
     ref = reference[0]
     ref.regular = is_regular(samples[:, T])
     ref.spike[:] = spike_sizes(samples)
+    ref.longest_repeat = longest_repeat(samples[window])
     ref.n, ref.period, ref.seconds = n, period_of(samples[:, T]), np.ptp(part[:, T])
     with np.errstate(all='ignore'):
         measured = np.isfinite(part).mean(axis=0) > 0.5
@@ -114,6 +121,7 @@ def learn(
     sigma = np.full(N_RESIDUALS, np.nan)
     if ref.stem_kind == LAW:
         sigma[R1] = max(identified.sigma, 1e-4)
+        ref.wander = wander_of(values[:, R1])
     slow = slow_sigma(ref, settings, prediction, part)
     set_limits(ref, settings, values, sigma, slow, wandering)
     if ref.stem_kind == NOMINAL and prediction is not None:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damadics_fd.core.scada.judging.cusum import R1, R2, TEST_NAMES, TESTS
-from damadics_fd.core.scada.judging.predict import STRANGE
+from damadics_fd.core.scada.judging.predict import STRANGE, stands_still
 from damadics_fd.core.scada.judging.residuals import FLOW_TOLD, STEM_TOLD
 from damadics_fd.core.scada.judging.roughness import rougher
 from damadics_fd.core.scada.laws.actuator import F_RANGE, P_RANGE, T_RANGE, TPH_PER_KGS
@@ -260,6 +260,8 @@ class ScadaMonitor:
             return []
         ref = self.reference[0]
         off = []
+        if stands_still(self.state, ref):
+            off.append('stem and flow (all signals stand still)')
         if not ref['sd'][FLOW_TEST] > 0.0:
             off.append('the flow (P1, P2, T1 or F is not measured, or too few samples)')
         if not ref['drop'] > 0.0:

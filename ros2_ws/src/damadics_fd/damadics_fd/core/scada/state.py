@@ -55,6 +55,7 @@ class Reference(Record):
     flow_law: FlowLaw
     period: float  # of the samples learned from, s
     regular: bool  # they came at it, one like the other
+    longest_repeat: int  # rows in a row that were the row before
     signals: int  # bit i: signal i of the samples was measured
     low: Annotated[Floats, 7]  # learned range of each signal
     high: Annotated[Floats, 7]
@@ -81,6 +82,7 @@ class Reference(Record):
     h: Annotated[Floats, N_TESTS]
     clip: Annotated[Floats, N_TESTS]
     rough: Annotated[Floats, N_ROUGH, 2]  # usual change from sample to sample, block to block
+    wander: float  # by which a stem at rest was seen off its law for some seconds
     s1: float
     kap2: float
     llr_limit: float

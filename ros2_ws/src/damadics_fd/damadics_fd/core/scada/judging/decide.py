@@ -14,6 +14,7 @@ from damadics_fd.core.scada.state import LAW, N_RESIDUALS, N_TESTS, MonitorState
 
 LLR_CLIP = 8.0
 MOTION = 0.003  # of the stroke: the stem has moved
+HELD = 10  # samples at rest after which its play may hold a stem beside its law
 SHOWN = 60  # samples after a motion that show its friction
 SCALES = np.array([2 if test.block >= 30 else 1 for test in TESTS])  # of the roughness
 # Multiples of its limit beyond which a statistic does not grow, so that it comes back in time
@@ -91,6 +92,8 @@ def decide(s: MonitorState, ref: Reference) -> None:
         s.ratio = 1.0 if s.stood else 0.0
         return
     reject_spikes(s, ref)
+    if ref.stem_kind == LAW:
+        allow_for_play(s, ref)
     onset = s.t
     top = 0.0
     for i in range(N_TESTS):
@@ -180,6 +183,16 @@ def rests(x: float, anchor: float, rest: int) -> int:
     (0, 8)
     """
     return 0 if abs(x - anchor) > MOTION else rest + 1
+
+
+@jit
+def allow_for_play(s: MonitorState, ref: Reference) -> None:
+    """Let a stem stand beside a law that rests by as much as it did in the record."""
+    s.rest = rests(s.xm[0], s.anchor, s.rest)
+    if s.rest == 0:
+        s.anchor = s.xm[0]
+    if s.rest >= HELD:
+        s.lasting = max(s.lasting, ref.wander)
 
 
 @jit

@@ -28,6 +28,9 @@ SLOW = 30  # block of the tests that sum up hundreds of samples
 SLOWEST_OF_LAW = 0.15
 LAW_MARGIN = 1.0  # of an identified law, whose residual is neither white nor normal
 LEAST = 200
+# How long a stem is off its law where its play holds it, and how often that was seen, at least.
+OFF_SAMPLES, SELDOM = 10, 0.002
+OFF_ROOM = 1.2
 
 
 @jit
@@ -165,6 +168,22 @@ def set_limits(
         ref.mu[i], ref.sd[i], ref.k[i], ref.clip[i] = mu, sd, k, clip
         ref.se[i] = (STANDARD_ERRORS[test.block] or DISTANCE_ERRORS) / math.sqrt(n)
         ref.h[i] = max(margin * siegmund_limit(k, arl), HEAD_ROOM * largest)
+
+
+def wander_of(r: Floats) -> float:
+    """
+    Return by how much a residual is off for some samples now and then.
+
+    A play that a law knows but in part leaves the stem beside it for as long as CV rests.
+
+    :param r: stem residual of an identified law, NaN where not testable.
+    """
+    v = r[np.isfinite(r)]
+    if v.size < LEAST // 2:
+        return 0.0
+    sums = np.cumsum(np.r_[0.0, v])
+    means = np.abs(sums[OFF_SAMPLES:] - sums[:-OFF_SAMPLES]) / OFF_SAMPLES
+    return OFF_ROOM * float(np.quantile(means, 1.0 - SELDOM))
 
 
 def _of_law(ref: Reference, i: int, r: Floats, sigma: float, arl: float) -> None:

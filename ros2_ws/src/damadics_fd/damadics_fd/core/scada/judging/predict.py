@@ -74,6 +74,12 @@ def repeated(s: MonitorState) -> bool:
 
 
 @jit
+def stands_still(s: MonitorState, ref: Reference) -> bool:
+    """Tell whether the record shows the same row for longer than it did while learning."""
+    return s.repeats > max(COPIES, ref.longest_repeat)
+
+
+@jit
 def filter_pressures(s: MonitorState, ref: Reference, p1: float, p2: float) -> None:
     """Fuse each pressure with its prediction; do not believe a single value far from it."""
     s.innovation[:] = math.nan
@@ -139,12 +145,16 @@ def predict(
     elif ref.regular and missing(ref, (t - s.t) / max(cfg.period_s, ref.period)):
         bridge(s, ref, t)
     watch_period(s, cfg, ref, t)
+    stood_still = stands_still(s, ref)
     entry = s.history[s.samples % HISTORY_LENGTH]
     t0 = s.t if s.filled > 0 else t
     s.samples += 1
     s.t = t
     count_repeats(s, cv, x, p1, p2, flow)
-    if not repeated(s):
+    if stood_still and s.repeats == 0:
+        bridge(s, ref, t)
+        s.t_flow = max(s.t_flow, t + METER_LAGS * max(ref.flow_law.lag_s, ref.period))
+    if not repeated(s) and not stands_still(s, ref):
         advance_track(s.track, ref.stem_law, t, cv)
     law = ref.stem_kind == LAW
     if not law:

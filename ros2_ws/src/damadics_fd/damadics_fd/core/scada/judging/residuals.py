@@ -6,7 +6,7 @@ import math
 
 from damadics_fd.core.jit import jit
 from damadics_fd.core.scada.judging.cusum import P1, P2, PROCESS, QUICK, R1, R2, T1, TEST_RESIDUAL
-from damadics_fd.core.scada.judging.predict import repeated
+from damadics_fd.core.scada.judging.predict import repeated, stands_still
 from damadics_fd.core.scada.judging.roughness import follow_roughness
 from damadics_fd.core.scada.laws.flow_law import flow_doubt, slope
 from damadics_fd.core.scada.laws.stem_law import outside, shrink, stem_doubt, transient_doubt
@@ -87,9 +87,10 @@ def residuals(
     s.residual[R1] = shrink(raw, doubt)
     s.residual[R2] = flow_residual(s, ref, x, flow)
     s.testable[R1] = 1 if s.t >= s.t_stem else 0
-    if repeated(s) and ref.stem_kind == LAW:
+    still = stands_still(s, ref)
+    if still or (repeated(s) and ref.stem_kind == LAW):
         s.testable[R1] = 0
-    if (repeated(s) and ref.flow_kind == LAW) or s.t < s.t_flow:
+    if still or (repeated(s) and ref.flow_kind == LAW) or s.t < s.t_flow:
         s.testable[R2] = 0
     s.residual[P1] = s.innovation[0]
     s.residual[P2] = s.innovation[1]

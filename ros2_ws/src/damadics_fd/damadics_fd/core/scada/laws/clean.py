@@ -49,6 +49,18 @@ def despiked(samples: Floats) -> Floats:
     return out
 
 
+def longest_repeat(samples: Floats) -> int:
+    """
+    Return how often in a row the same CV, X', P1', P2', F' came again.
+
+    >>> longest_repeat(np.array([[0, 1, 2, 3, 4, 5, 6], [1, 1, 2, 3, 4, 5, 6.0]]))
+    1
+    """
+    values = np.nan_to_num(samples[:, (1, 2, 3, 4, 6)], nan=-1.0)
+    changes = np.flatnonzero((np.diff(values, axis=0) != 0.0).any(axis=1))
+    return int(np.diff(np.r_[-1, changes, len(samples) - 1]).max()) - 1
+
+
 def period_of(t: Floats) -> float:
     """Return the usual time between samples, s."""
     return float(np.median(np.diff(t))) if len(t) > 1 else 1.0

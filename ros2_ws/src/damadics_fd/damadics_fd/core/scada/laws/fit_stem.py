@@ -89,6 +89,7 @@ def fit_stem(pieces: Sequence[Piece], period: float) -> StemFit:
     """
     law = np.zeros(1, STEM_LAW)
     law['rise'] = law['fall'] = law['slow_rise'] = law['slow_fall'] = FAST
+    law['farthest'] = FAST  # nothing is farther while the law is sought
     law['gain'] = 1.0
     law['lag_s'] = min(max(period, 0.5), 5.0)
     x = np.concatenate([piece.x for piece in pieces])
@@ -221,6 +222,9 @@ def _finish(law: np.ndarray, pieces: Sequence[Piece], x: Floats) -> StemFit:
     left = x - position[:, 0]
     beyond = x - np.clip(x, position.min(axis=1), position.max(axis=1))
     law['transient'] = _transient(law, beyond, track[:, COPIES], sigma)
+    cv = np.concatenate([piece.cv for piece in pieces])
+    way = np.maximum(track[:, COPIES], np.abs(cv - u))
+    law['farthest'] = np.sort(way)[-max(3, len(way) // 1000)]
     return StemFit(law, position, left, spread_of(left), 1.0 + float(free[1]), error, arrived)
 
 

@@ -21,6 +21,7 @@ from damadics_fd.core.record import Floats, Record
 DELAYS = 64  # samples of CV kept for the dead time
 FADE_LAGS, FADE_S = 3.0, 5.0  # how long a motion is remembered
 TRANSIENT = 0.08  # of the way still to go that a law knows no better
+UNSEEN = 0.25  # the same of the way beyond the longest in the record
 FAST = 1e3  # a rate that limits nothing, 1/s
 QUICKER = 1.5  # multiples of a limit of its rate at which a stem may move on another day
 COPIES = 3  # law, slow copy, quick copy
@@ -37,6 +38,7 @@ class StemLaw(Record):
     slow_rise: float  # fastest closing at which the law was seen to hold
     slow_fall: float
     transient: float  # doubt while it moves, share of the way still to go
+    farthest: float  # longest way to go in the record
     band: float  # dead band, share of stroke
     gain: float
     offset: float
@@ -114,6 +116,17 @@ def advance_track(s: StemTrack, law: StemLaw, t: float, cv: float) -> None:
         follow_held(s, law, t - law.dead_s, dt)
     else:  # the command in the middle of the interval stands for the interval
         follow(s, law, delayed(s, t - law.dead_s - 0.5 * min(dt, law.lag_s)), dt)
+    allow_haste(s, law, min(max(cv, 0.0), 1.0))
+
+
+@jit
+def allow_haste(s: StemTrack, law: StemLaw, command: float) -> None:
+    """Put the quick copy where CV is while the way there is longer than any in the record."""
+    way = abs(command - s.lagged[0])
+    if way > law.farthest:  # small motion does not show how a large one is delayed
+        s.was_ahead = max(s.was_ahead, way)
+        s.lagged[2] = command
+        s.held[2] = command
 
 
 @jit
@@ -193,7 +206,8 @@ def stem_doubt(law: StemLaw, x: float) -> float:
 def transient_doubt(s: StemTrack, law: StemLaw) -> float:
     """Return by how much the law may be wrong because it moves, or moved a little while ago."""
     value: float = TRANSIENT * s.ahead + (law.transient - TRANSIENT) * s.was_ahead
-    return value
+    # small motion shows the sum of dead time, lag and play, not how a large step shares them
+    return value + UNSEEN * max(s.was_ahead - law.farthest, 0.0)
 
 
 @jit

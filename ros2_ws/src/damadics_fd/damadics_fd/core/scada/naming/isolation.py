@@ -57,6 +57,7 @@ INCIPIENT_ONLY = frozenset({3, 4, 5, 6, 9})  # no physical background as abrupt 
 PROCESS_FIRST_S = 3.0
 FLOW_END, MOSTLY = 0.97, 0.9  # of the meter's range; share of the samples that show it
 ABRUPT_PRIOR = 8.0  # nats against them after an abrupt onset
+SEAT = frozenset({2, 3})  # they move the stem by less than its model is known
 TWO_SIDED = frozenset({12, 13, 19})
 HYPOTHESES = tuple(n for n in NAMES if n not in (7, 17))
 GRID = (0.03, 0.15, 0.35, 0.6, 0.85)
@@ -273,6 +274,8 @@ class Isolator:
             faults if fault in STEM_FAULTS else None,
             faults if fault in TOLD_BY_FLOW else None,
         )
+        if fault in SEAT:
+            stem = min(stem, self._nominal[0])
         n = 0.5 * len(window)
         total = n * misfit(stem, self._variance[0])
         if not math.isnan(flow):
