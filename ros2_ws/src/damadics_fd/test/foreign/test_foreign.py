@@ -93,7 +93,7 @@ def test_five_percent_of_missing_or_doubled_samples_do_not_matter():
 )
 def test_a_foreign_valve_is_watched_without_alarm_and_its_fault_named(change):
     build = kinds.random_valve(25, **change)
-    proposal = commissioned(build, 25, stiffness=build.stiffness)
+    proposal = commissioned(build, 25)
     assert proposal.verdict == 'ok', proposal.limiting
     for fault in ('friction +100 %', 'spring -20 %'):
         t = trial(build, proposal, fault, 25)

@@ -28,6 +28,7 @@ from damadics_fd.commands.commission.verdict import (
     parts_differ,
     sheet_differs,
     smallest,
+    unchecked,
 )
 from damadics_fd.core.monitor import run
 from damadics_fd.core.result import Columns, Result
@@ -172,6 +173,7 @@ def _propose(
             'see to the packing, or to a positioner that hunts'
         )
     remarks += sheet_differs(balance, sheet, given)
+    remarks += unchecked(balance, given)
     remarks += [f'not determined: {name}' for name in balance.undetermined]
     return Proposal(
         settings,

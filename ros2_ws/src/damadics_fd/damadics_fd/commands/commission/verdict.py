@@ -142,40 +142,45 @@ def sheet_differs(b: Balance, sheet: Settings, given: Collection[str]) -> list[s
 
 def another_valve(b: Balance, sheet: Settings, given: Collection[str]) -> list[str]:
     """
-    Tell where the data sheet is another valve's, or what of it no recording can check.
+    Tell where the stated spring is so far from the one found that the data sheet is another's.
+
+    Stiffness is found as force over way: a wrong stroke or area shifts it as a wrong spring does.
+
+    :param b: the balance.
+    :param sheet: what was stated.
+    :param given: names of what was stated.
+    :return: a sentence, none where it fits or no stiffness was stated.
+    """
+    share = b.settings.stiffness / sheet.stiffness
+    if 'stiffness' not in given or 1.0 - ANOTHER <= share <= 1.0 + ANOTHER:
+        return []
+    return [
+        f'the spring is {share:.2f} times as stiff as stated: stroke, area or stiffness is not '
+        'that of this valve, and sizes in N and mm are off; changes are told as shares'
+    ]
+
+
+def unchecked(b: Balance, given: Collection[str]) -> list[str]:
+    """
+    Name what is taken from the settings because no recording can check it.
 
     Pressures and positions as shares give forces in units of the area, and nothing in metres. A
     stated stiffness tells the stroke, a plug force as the sheet has it tells the area.
 
     :param b: the balance.
-    :param sheet: what was stated.
     :param given: names of what was stated.
-    :return: a sentence for each, none where the stiffness is stated and all fits.
+    :return: a sentence, none where the stiffness is stated.
     """
-    found = []
-    share = b.settings.stiffness / sheet.stiffness
-    stated = 'stiffness' in given
-    if stated and not 1.0 - ANOTHER <= share <= 1.0 + ANOTHER:
-        found.append(
-            f'the spring is {share:.2f} times as stiff as stated: stroke, area or stiffness is '
-            'not that of this valve, and sizes in N and mm are off; changes are told as shares'
-        )
+    if 'stiffness' in given:
+        return []
     telling = b.plug > TELLING_PLUG * b.settings.stiffness * b.settings.stroke
-    fits = 1.0 / OTHER_PLUG <= b.gain <= OTHER_PLUG
-    if telling and not fits:
-        found.append(
-            f'the plug force is {b.gain:.2f} of what area, plug_diameter and plug_table say: one '
-            'of them is not that of this valve, or its trim is balanced; where it is the area, '
-            'sizes in N are off; changes are still told as shares'
-        )
-    if not stated:
-        unseen = 'the stroke is' if telling and fits else 'stroke and area are'
-        found.append(
-            f'{unseen} taken from the settings, which no recording checks: state the '
-            'stiffness of the spring too (--set stiffness=N/m); N/m and mm are as good as they, '
-            'changes told as shares are right in any case'
-        )
-    return found
+    area_fits = telling and 1.0 / OTHER_PLUG <= b.gain <= OTHER_PLUG
+    taken = 'the stroke is' if area_fits else 'stroke and area are'
+    return [
+        f'{taken} taken from the settings, which no recording checks: state the stiffness of the '
+        'spring too (--set stiffness=N/m); N/m and mm are as good as they, changes told as shares '
+        'are right in any case'
+    ]
 
 
 def hidden_friction(b: Balance) -> bool:
