@@ -103,6 +103,24 @@ DATED = {
     'milliseconds by name': rows('time_ms,cv,x1,ps', lambda i: str(STAMP[i] // 10**6)),
     'tabs': rows('time\tcv\tx1\tps', lambda i: iso(STAMP[i]), '\t'),
     'blanks': rows('  time  cv x1   ps', lambda i: f'   {STAMP[i] / 1e9:.16e}', '   '),
+    'signs of percent': '\n'.join(
+        [
+            'time,cv,x1,ps',
+            *(
+                f'{iso(STAMP[i])},{100 * CV[i]} %,{50 * CV[i]}%,{1e5 + 1e5 * CV[i]}'
+                for i in range(N)
+            ),
+        ]
+    ),
+    'thousands parted by apostrophes': '\n'.join(
+        [
+            'time;cv;x1;ps',
+            *(
+                f'{iso(STAMP[i])};{CV[i]};{CV[i] / 2};{1e5 + 1e5 * CV[i]:_.9f}'.replace('_', "'")
+                for i in range(N)
+            ),
+        ]
+    ),
     'blanks and tabs': rows('% time \t cv \t x1 \t ps', lambda i: f' {iso(STAMP[i])}', ' \t '),
 }
 
@@ -159,22 +177,64 @@ def test_opening_percent_and_milliamperes_become_closed_shares(tmp_path):
     assert columns['x1'] == pytest.approx(CV)
 
 
-@pytest.mark.parametrize('time', ['dates', 'zoned', 'seconds', 'stamp', 'text'])
+def test_times_of_day_count_on_over_midnight(tmp_path):
+    begin = 86_399 * 10**9 + 900_000_000
+    times = [divmod(begin + i * 5_000_000, 10**9) for i in range(N)]
+
+    def text(i: int) -> str:
+        second, rest = times[i]
+        hour, minute = second // 3600 % 24, second // 60 % 60
+        return f'{hour:02d}:{minute:02d}:{second % 60:02d}.{rest // 10**6:03d}'
+
+    (tmp_path / 'a.csv').write_text(rows(PLAIN, text))
+    assert text(0) > text(N - 1)
+    assert columns_of(tmp_path / 'a.csv')['stamp'].tolist() == (begin + STAMP - START).tolist()
+
+
+MIDNIGHT = START // (86_400 * 10**9) * 86_400 * 10**9
+
+
+@pytest.mark.parametrize(
+    'time',
+    [
+        'dates',
+        'zoned',
+        'seconds',
+        'stamp',
+        'text',
+        'categories',
+        'views',
+        'duration',
+        'time of day',
+    ]
+    + ['date and time', 'date and text', 'texts'],
+)
 def test_parquet_is_read_like_csv(time, tmp_path):
-    pyarrow = pytest.importorskip('pyarrow')
+    pa = pytest.importorskip('pyarrow')
     from pyarrow import parquet
 
+    texts = [iso(stamp, 'Z') for stamp in STAMP]
+    days, clocks = [text[:10] for text in texts], [text[11:-1] for text in texts]
+    day = pa.array(STAMP, pa.timestamp('ns')).cast(pa.date32(), safe=False)
+    clock = pa.array(STAMP - MIDNIGHT, pa.time64('ns'))
     made = {
-        'dates': lambda: ('time', pyarrow.array(STAMP, pyarrow.timestamp('ns'))),
-        'zoned': lambda: ('when', pyarrow.array(STAMP, pyarrow.timestamp('ns', 'Europe/Berlin'))),
-        'seconds': lambda: ('t', pyarrow.array(STAMP / 1e9)),
-        'stamp': lambda: ('stamp', pyarrow.array(STAMP)),
-        'text': lambda: ('time', pyarrow.array([iso(stamp, 'Z') for stamp in STAMP])),
+        'dates': lambda: {'time': pa.array(STAMP, pa.timestamp('ns'))},
+        'zoned': lambda: {'when': pa.array(STAMP, pa.timestamp('ns', 'Europe/Berlin'))},
+        'seconds': lambda: {'t': pa.array(STAMP / 1e9)},
+        'stamp': lambda: {'stamp': pa.array(STAMP)},
+        'text': lambda: {'time': pa.array(texts)},
+        'categories': lambda: {'time': pa.array(texts).dictionary_encode()},
+        'views': lambda: {'time': pa.array(texts, pa.string_view())},
+        'duration': lambda: {'time': pa.array(STAMP - MIDNIGHT, pa.duration('ns'))},
+        'time of day': lambda: {'time': clock},
+        'date and time': lambda: {'date': day, 'time': clock},
+        'date and text': lambda: {'date': day, 'time': pa.array(clocks)},
+        'texts': lambda: {'date': pa.array(days), 'time': pa.array(clocks)},
     }
-    name, stamps = made[time]()
-    parquet.write_table(pyarrow.table({name: stamps, **VALUES}), tmp_path / 'a.parquet')
+    parquet.write_table(pa.table({**made[time](), **VALUES}), tmp_path / 'a.parquet')
     columns = columns_of(tmp_path / 'a.parquet')
-    assert np.abs(columns['stamp'] - STAMP).max() < 1000
+    first = MIDNIGHT if time in ('duration', 'time of day') else 0
+    assert np.abs(columns['stamp'] + first - STAMP).max() < 1000
     assert columns['x1'].tolist() == VALUES['x1'].tolist()
 
 

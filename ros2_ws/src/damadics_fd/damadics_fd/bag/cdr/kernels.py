@@ -20,6 +20,7 @@ BESIDES = 22  # [B] in its length besides the data
 PLAIN_CDR = 0x0100  # the first two bytes of a message in plain CDR, little endian
 BILLION = 1_000_000_000
 TOGETHER = 64  # messages of which the fields are copied at once
+WIDER = [np.dtype(f'<u{size}') for size in (2, 4, 8)]
 SHORTEST = 64  # [B] so that views of words have several elements, which numba tells from one
 
 
@@ -47,7 +48,8 @@ def words(data: NDArray[np.uint8]) -> Words:
     """
     if len(data) < SHORTEST:
         data = np.concatenate([data, np.zeros(SHORTEST, np.uint8)])
-    wide = [np.ndarray((len(data) - size + 1,), f'<u{size}', data, 0, (1,)) for size in (2, 4, 8)]
+    places = len(data) + 1
+    wide = [np.ndarray((places - kind.itemsize,), kind, data, 0, (1,)) for kind in WIDER]
     return Words(data, *wide)
 
 

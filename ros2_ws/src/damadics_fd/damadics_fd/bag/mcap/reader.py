@@ -155,28 +155,33 @@ class McapFile(MessageFile):
         begin = self.read_bytes(at, HEAD.size + BEGIN)
         if len(begin) < HEAD.size:
             raise BagError('ends in the middle of a record')
-        op, length = HEAD.unpack_from(begin)
-        if 0 < op < KNOWN:
-            length = self._length(Op(op), at, length, begin[HEAD.size :])
-        content = begin[HEAD.size :][:length]
-        if op == Op.CHUNK and not self._chunked:
-            self._chunked = well_formed(Op.CHUNK, content, length)
+        number, length = HEAD.unpack_from(begin)
+        op, content = _OPS.get(number), begin[HEAD.size :]
+        if op:
+            end, complete = fields_end(op, content)
+            sound = complete and end == length
+            if not sound:
+                length = self._length(op, at, length, end, complete)
+                sound = well_formed(op, content, length)
+            if op == Op.CHUNK and not self._chunked:
+                self._chunked = sound
+        content = content[:length]
         if at + HEAD.size + length > self._size:
             raise BagError('ends in the middle of a record, or the record is damaged')
-        if op >= KNOWN:
-            return _Found(op, length)  # none of our business
+        if number >= KNOWN:
+            return _Found(number, length)  # none of our business
         if length > self.limits.record and op != Op.ATTACHMENT:
             raise BagError(f'a record of {length} bytes is beyond the limit')
         if not op:
-            raise BagError(f'there is no record type {op:#x}')
-        op = Op(op)
+            raise BagError(f'there is no record type {number:#x}')
         if op == Op.CHUNK:
             return _Found(op, length, chunk=self._chunk(at, length, content))
         if op in _PARSED and length > self.limits.text:
             raise BagError(f'a {op.name} record of {length} bytes is beyond the limit')
         if op in _PARSED and length > BEGIN:
             content = self.read_bytes(at + HEAD.size, length)
-        if not well_formed(op, content, length):
+            sound = well_formed(op, content, length)
+        if not sound:
             raise BagError(f'the {op.name} record is damaged')
         if op in (Op.SCHEMA, Op.CHANNEL):
             self.note_record(op, content)
@@ -200,9 +205,8 @@ class McapFile(MessageFile):
             self._window = max(FIRST, 1 << (2 * end).bit_length())
         return _Found(Op.MESSAGE, end - HEAD.size, chunk=data[:end])
 
-    def _length(self, op: Op, at: int, stated: int, content: bytes) -> int:
-        """Return the length of a record: by its fields, where other records follow these."""
-        end, complete = fields_end(op, content)
+    def _length(self, op: Op, at: int, stated: int, end: int, complete: bool) -> int:
+        """Return the length of a record: by the end of its fields, where others follow these."""
         behind = at + HEAD.size + end
         if end == stated or not complete or not follows(self.read_bytes, behind, *self._bounds):
             return stated
@@ -308,4 +312,5 @@ class McapFile(MessageFile):
         return crc
 
 
+_OPS = {int(op): op for op in Op}
 _PARSED = (Op.HEADER, Op.SCHEMA, Op.CHANNEL, Op.METADATA)

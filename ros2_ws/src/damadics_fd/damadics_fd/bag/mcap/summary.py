@@ -7,8 +7,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-import numpy as np
-
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.limits import Limits
 from damadics_fd.bag.mcap.crc import crc32
@@ -30,6 +28,8 @@ from damadics_fd.bag.mcap.records import (
 TAIL = 1 << 22  # [B] searched where bytes were lost or added before the summary
 _DATA_END = HEAD.pack(Op.DATA_END, 4)
 _PLACE = struct.Struct('<QQ')
+_INDEX = struct.Struct(CHUNK_INDEX.format + 'I')  # and the size of the pairs behind it
+_PAIR = struct.Struct('<HQ')
 Read = Callable[[int, int], bytes]  # place, size
 
 
@@ -115,25 +115,41 @@ def _starts(read: Read, stated: int, end: int, limits: Limits) -> Iterator[int]:
         yield first + at + len(_DATA_END) + 4
 
 
-def _pairs(data: bytes) -> dict[int, int]:
-    return dict(np.frombuffer(data, '<u2,<u8').tolist())
+def _pairs(data: bytes | memoryview) -> dict[int, int]:
+    if len(data) % _PAIR.size:
+        raise BagError('a map in the summary is damaged')
+    return {channel: value for channel, value in _PAIR.iter_unpack(data)}
 
 
 def _parse(data: memoryview, limits: Limits) -> Summary:
     summary = Summary()
     at = text = 0
     while at < len(data):
-        fields = Fields(data[at : at + HEAD.size])
-        op, length = fields.unpack(HEAD)
-        content = data[at + HEAD.size : at + HEAD.size + length]
-        if len(content) < length:
+        begin = at + HEAD.size
+        op, length = HEAD.unpack_from(data, at) if begin <= len(data) else (0, len(data))
+        if begin + length > len(data):
             raise BagError('the summary ends in the middle of a record')
-        at += HEAD.size + length
+        at = begin + length
+        content = data[begin:at]
         text += length if op in (Op.SCHEMA, Op.CHANNEL) else 0
         if text > limits.text:
             raise BagError('the summary is beyond the limit')
-        _note(summary, op, content)
+        if op == Op.CHUNK_INDEX:
+            _note_chunk(summary, content)
+        else:
+            _note(summary, op, content)
     return summary
+
+
+def _note_chunk(summary: Summary, content: memoryview) -> None:
+    """Note one of the many."""
+    if len(content) < _INDEX.size:
+        raise BagError('the index of a chunk is damaged')
+    start, end, offset, length, size = _INDEX.unpack_from(content)
+    if size > len(content) - _INDEX.size:
+        raise BagError('the index of a chunk is damaged')
+    pairs = _pairs(content[_INDEX.size : _INDEX.size + size])
+    summary.chunks[offset] = Indexed(start, end, length, pairs)
 
 
 def _note(summary: Summary, op: int, content: memoryview) -> None:
@@ -144,9 +160,6 @@ def _note(summary: Summary, op: int, content: memoryview) -> None:
     elif op == Op.CHANNEL:
         channel = parse_channel(content)
         summary.channels[channel.id] = channel
-    elif op == Op.CHUNK_INDEX:
-        start, end, offset, length = fields.unpack(CHUNK_INDEX)
-        summary.chunks[offset] = Indexed(start, end, length, _pairs(fields.bytes_()))
     elif op == Op.STATISTICS:
         summary.messages, _, _, *records, _, _ = fields.unpack(STATISTICS)
         summary.records = (records[0], records[1], records[2])

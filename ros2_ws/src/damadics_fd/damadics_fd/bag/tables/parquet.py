@@ -68,8 +68,8 @@ class ParquetTable(Table):
 
     def _pieces(self, valves: Sequence[str] | None, on_problem: Told) -> Iterator[Columns]:
         signals = self.assignment.signals
-        clock = self.names[self.assignment.time[0]]
-        wanted = {clock, *(self.names[use.column] for use in signals.values())}
+        clock = [self.names[column] for column in self.assignment.time]
+        wanted = {*clock, *(self.names[use.column] for use in signals.values())}
         wanted |= {VALVE} if valves is not None else set()
         row = 0
         try:
@@ -83,7 +83,7 @@ class ParquetTable(Table):
                             continue
                     for name, use in signals.items():
                         columns[name] = use.scale(_numbers(batch.column(self.names[use.column])))
-                    time = batch.column(clock)
+                    time = _time([batch.column(name) for name in clock])
                     exact = _exact(time, self.assignment.scale == NANOSECONDS)
                     if exact is not None:
                         yield columns | {'stamp': exact}
@@ -97,7 +97,7 @@ class ParquetTable(Table):
 
     def _stamps(self, time: 'pyarrow.Array') -> NDArray[np.float64]:
         """Return times [ns] that are numbers or text, NaN where there is none."""
-        if pyarrow.types.is_string(time.type) or pyarrow.types.is_large_string(time.type):
+        if _is_text(time.type):
             texts = [text or '' for text in time.to_pylist()]
             dates = Dates(texts)
             return np.array([dates(text) if text else np.nan for text in texts], float)
@@ -124,6 +124,37 @@ def _of_valves(
     number = np.array(compute.fill_null(found, -1).to_numpy(zero_copy_only=False), np.int64)
     own = number >= 0
     return (batch if own.all() else batch.filter(pyarrow.array(own))), number[own]
+
+
+def _is_text(kind: 'pyarrow.DataType') -> bool:
+    types = pyarrow.types
+    return bool(types.is_string(kind) or types.is_large_string(kind) or types.is_string_view(kind))
+
+
+def _time(columns: Sequence['pyarrow.Array']) -> 'pyarrow.Array':
+    """Return one column of times: text, numbers or timestamps; of a date and a time of day."""
+    types, parts = pyarrow.types, []
+    for column in columns:
+        if types.is_dictionary(column.type):
+            column = column.dictionary_decode()
+        if _is_text(column.type):
+            column = column.cast(pyarrow.string())
+        elif types.is_date(column.type):
+            column = column.cast(pyarrow.timestamp('ns'))
+        elif types.is_time(column.type) or types.is_duration(column.type):
+            of = pyarrow.time64 if types.is_time(column.type) else pyarrow.duration
+            column = column.cast(of('ns')).cast(pyarrow.int64()).cast(pyarrow.timestamp('ns'))
+        parts.append(column)
+    if len(parts) == 1:
+        return parts[0]
+    if any(_is_text(part.type) for part in parts):
+        day, clock = (
+            compute.strftime(part, form) if types.is_timestamp(part.type) else part
+            for part, form in zip(parts, ('%Y-%m-%d', '%H:%M:%S'), strict=True)
+        )
+        return compute.binary_join_element_wise(day, clock, ' ')
+    total = compute.add(*(part.cast(pyarrow.int64()) for part in parts))
+    return total.cast(pyarrow.timestamp('ns'))
 
 
 def _exact(time: 'pyarrow.Array', is_stamp: bool) -> NDArray[np.int64] | None:
@@ -160,7 +191,7 @@ def read_parquet(path: Path, actuator: int | None, chosen: Mapping[str, Source])
     tables: list[Table] = []
     valves: list[str | None] = [*_valves(path, schema)] if VALVE in names else [None]
     for name, assignment in found.items():
-        time = assignment.time[:1] or tuple(dates[:1])
+        time = assignment.time or tuple(dates[:1])
         if time:
             placed = Assignment(assignment.signals, time, assignment.scale)
             tables += [ParquetTable(path, v or name, placed, names, v) for v in valves]

@@ -23,6 +23,9 @@ NOT_MEASURED = (
 )  # fmt: skip
 
 
+_BETWEEN = dict.fromkeys(map(ord, "\u202f\u00a0'\u2019"))  # thousands, beside comma and point
+
+
 @dataclass(frozen=True)
 class Layout:
     """
@@ -31,7 +34,8 @@ class Layout:
     :param encoding: of the file.
     :param delimiter: between the fields; `BLANKS` for any number of them.
     :param names: header line, empty where there is none.
-    :param units: line of units below it, empty where there is none.
+    :param units: line of units below it, or signs of percent in the cells; empty where there are
+        none.
     :param skipped: lines before the data.
     :param rows: the first rows of data.
     """
@@ -50,10 +54,13 @@ def parse_cell(text: str) -> float:
 
     >>> parse_cell(' 12,5'), parse_cell(''), parse_cell('"3e-2"'), parse_cell('1.234,5')
     (12.5, nan, 0.03, 1234.5)
+    >>> parse_cell("1'234.5"), parse_cell('39.5 %')
+    (1234.5, 39.5)
     """
-    text = text.strip().strip('"').replace('\u202f', '').replace('\u00a0', '')
+    text = text.strip().strip('"').translate(_BETWEEN)
     if text.lower() in NOT_MEASURED:
         return math.nan
+    text = text.removesuffix('%')  # a unit of the column: `sniff`
     if ',' in text:
         if '.' in text:  # the last one is the decimal sign, the other parts thousands
             thousands = '.' if text.rindex(',') > text.rindex('.') else ','
@@ -117,8 +124,17 @@ def sniff(path: Path) -> Layout:
         else:
             names = tuple(table[before[-1]])
     rows = tuple(tuple(cells) for cells in table[first:] if _is_data(cells, width))
+    if any('%' in cell for cells in rows for cell in cells):
+        units = tuple(_unit(i, units, rows) for i in range(width))
     stripped = tuple(name.strip().lstrip('#').strip() for name in names)
     return Layout(encoding, delimiter, stripped, units, first, rows)
+
+
+def _unit(column: int, units: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return the unit of a column: what stands below the header, or the sign in its cells."""
+    told = units[column].strip() if column < len(units) else ''
+    signed = any(cells[column].rstrip(' "').endswith('%') for cells in rows if column < len(cells))
+    return told or ('%' if signed else '')
 
 
 def _encoding(data: bytes, path: Path) -> str:

@@ -9,6 +9,7 @@ from datetime import UTC, datetime, timedelta, timezone
 from damadics_fd.bag.errors import BagError
 
 NANO = 10**9
+DAY = 86_400 * NANO
 _MONTHS = ('jan', 'feb', 'mar', 'apr', 'may', 'jun', 'jul', 'aug', 'sep', 'oct', 'nov', 'dec')
 _GERMAN = {'mrz': 'mar', 'mär': 'mar', 'mai': 'may', 'okt': 'oct', 'dez': 'dec'}
 _ZONE = r'(?P<zone>Z|UTC|GMT|[+-]\d{2}(?::?\d{2})?)?'
@@ -30,6 +31,7 @@ _SHAPES = (
     ),
     re.compile(rf'(?P<a>\d{{1,2}})/(?P<b>\d{{1,2}})/(?P<y>\d{{2,4}}){_CLOCK}'),
 )
+_OF_DAY = re.compile(r'(?P<h>\d{1,4}):(?P<m>[0-5]\d):(?P<s>[0-5]\d)(?:[.,](?P<f>\d{1,9}))?')
 _NOISE = re.compile(  # a weekday before the date, the name of a zone behind its offset
     r'^(?:mon|tue|wed|thu|fri|sat|sun)[a-z]*,?\s+|\[[\w/+-]+\]$', re.IGNORECASE
 )
@@ -42,7 +44,8 @@ class Dates:
     """
     Read the date-time stamps of a table.
 
-    Those without zone are taken as UTC: only their differences matter. Where day and month could
+    Those without zone are taken as UTC: only their differences matter; those without a date count
+    from the midnight before the first. Where day and month could
     be either (`03/04/2026`), the table decides.
 
     :param sample: some cells of the column.
@@ -66,6 +69,7 @@ class Dates:
             else:
                 self._day_first = first > 12
         self._known: tuple[str, int] = ('', 0)  # the last date and its midnight [ns]
+        self._midnights = self._latest = 0  # [ns] of times of day without a date
 
     def __call__(self, text: str) -> int:
         """
@@ -80,6 +84,8 @@ class Dates:
         for shape in _SHAPES:
             if match := shape.fullmatch(text):
                 return self._stamp(match)
+        if match := _OF_DAY.fullmatch(text):
+            return self._of_day(match)
         raise ValueError(f'{text!r} is no date')
 
     def _stamp(self, match: re.Match[str]) -> int:
@@ -93,6 +99,15 @@ class Dates:
         seconds = hour * 3600 + int(parts['m'] or 0) * 60 + int(parts['s'] or 0)
         nanoseconds = int((parts['f'] or '').ljust(9, '0') or 0)
         return self._known[1] + (seconds - _zone(parts['zone'])) * NANO + nanoseconds
+
+    def _of_day(self, match: re.Match[str]) -> int:
+        """Return a time without a date, counted on where midnight has passed [ns]."""
+        seconds = int(match['h']) * 3600 + int(match['m']) * 60 + int(match['s'])
+        stamp = seconds * NANO + int((match['f'] or '').ljust(9, '0'))
+        if self._latest - stamp > DAY // 2:
+            self._midnights += DAY
+        self._latest = stamp
+        return self._midnights + stamp
 
     def _midnight(self, parts: dict[str, str | None]) -> int:
         year = int(parts['y'] or 0)
@@ -127,7 +142,7 @@ def _zone(text: str | None) -> int:
 
 def is_date(text: str) -> bool:
     """
-    Tell whether a cell is a date, with or without a time of day.
+    Tell whether a cell is a date, with or without a time of day, or a time of day.
 
     >>> is_date('25.11.2026 14:00:01,5'), is_date('20261125140001'), is_date('1795615200000')
     (True, True, False)
@@ -135,7 +150,7 @@ def is_date(text: str) -> bool:
     text = _plain(text)
     if text.isdigit():
         return bool(_DIGITS.fullmatch(text))  # of other numbers nobody knows
-    return any(shape.fullmatch(text) for shape in _SHAPES)
+    return any(shape.fullmatch(text) for shape in (*_SHAPES, _OF_DAY))
 
 
 def seconds_of(value: float) -> float:
