@@ -21,11 +21,3 @@ class SubscriptionEventCallbacks:
         message_lost: Callable[[QoSMessageLostInfo], None] | None = None,
         use_default_callbacks: bool = True,
     ) -> None: ...
-
-class QoSPublisherMatchedInfo:
-    current_count: int
-
-class PublisherEventCallbacks:
-    def __init__(
-        self, *, matched: Callable[[QoSPublisherMatchedInfo], None] | None = None
-    ) -> None: ...

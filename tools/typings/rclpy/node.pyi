@@ -7,7 +7,7 @@ from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.client import Client
 from rclpy.clock import Clock
 from rclpy.context import Context
-from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
@@ -84,8 +84,6 @@ class Node:
         msg_type: type[M],
         topic: str,
         qos_profile: QoSProfile | int,
-        *,
-        event_callbacks: PublisherEventCallbacks | None = None,
     ) -> Publisher: ...
     def create_subscription(
         self,

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from damadics_fd.bag.arrays import Columns
 from damadics_fd.bag.cdr import kernels
-from damadics_fd.bag.cdr.decoder import Decoder, join
+from damadics_fd.bag.cdr.decoder import Decoder, join, merge
 from damadics_fd.bag.errors import BagError, printable
 from damadics_fd.bag.limits import Limits
 from damadics_fd.bag.messages import MessageFile
@@ -61,10 +61,10 @@ def read_columns(
     parts = list(
         iter_columns(path, topic, fields, valve=valve, on_problem=on_problem, limits=limits)
     )
-    names = parts[0].keys()
     if len(parts) == 1:
         return parts[0]
-    return {name: join([part[name] for part in parts if name in part]) for name in names}
+    names = [name for name in parts[0] if all(name in part for part in parts)]
+    return {name: join([part[name] for part in parts]) for name in names}
 
 
 def _read_whole(
@@ -121,9 +121,9 @@ def iter_columns(
         decoders: dict[int, Decoder] = {}
         counts: Counter[int] = Counter()
         for at, data in file.chunks():
-            for number, columns in _decoded(file, at, data, topic, fields, decoders):
+            columns = _decoded(file, at, data, topic, fields, decoders, counts)
+            if columns and len(columns['log_time']):
                 delivered = True
-                counts[number] += len(columns['log_time'])
                 yield columns
         seen |= {channel.topic for channel in file.channels.values()}
         name = resolved(topic, file)
@@ -192,22 +192,25 @@ def _decoded(
     topic: str,
     fields: Sequence[str] | None,
     decoders: dict[int, Decoder],
-) -> Iterator[tuple[int, Columns]]:
-    """Decode the messages of a topic in a chunk; `decoders` gets those of its channels."""
+    counts: Counter[int],
+) -> Columns | None:
+    """Decode the messages of a topic in a chunk; `decoders` and `counts` are by channel."""
     _note_channels(file, topic, fields, decoders)
     if len(decoders) == 1:
         number, decoder = next(iter(decoders.items()))
         columns = decoder.decode_alike(data)
         if columns:
-            if len(columns['log_time']):
-                yield number, columns
-            return
+            counts[number] += len(columns['log_time'])
+            return columns
     batch = file.index(data, at)
     _note_channels(file, topic, fields, decoders)
+    groups = []
     for number, decoder in decoders.items():
-        rows = batch.channels == number
-        if rows.any():
-            yield number, decoder.decode(batch, batch.starts[rows], batch.sizes[rows])
+        rows = np.flatnonzero(batch.channels == number)
+        if len(rows):
+            counts[number] += len(rows)
+            groups.append((rows, decoder.decode(batch, batch.starts[rows], batch.sizes[rows])))
+    return merge(groups) if groups else None
 
 
 def _note_channels(

@@ -7,7 +7,7 @@ import struct
 import numpy as np
 import pytest
 from damadics_fd.bag import BagError, read_columns
-from damadics_fd.bag.cdr.definition import parse_definition
+from damadics_fd.bag.cdr.definition import parse_definition, schema_text
 from damadics_fd.bag.cdr.layout import layout_of
 from damadics_fd.bag.mcap.writer import McapWriter
 
@@ -122,6 +122,26 @@ def test_a_constant_between_header_and_fields_shifts_nothing(tmp_path):
     columns = read_columns(tmp_path / 'a.mcap', '/a')
     assert columns['cv'].tolist() == [0.5, 1.5, 2.5]
     assert columns['x1'].tolist() == [0.25, 1.25, 2.25]
+
+
+@pytest.mark.parametrize('end', ['', '\n'])
+def test_definitions_are_parted_by_a_line_of_their_own(tmp_path, monkeypatch, end):
+    """A .msg file need not end with a line end: sensor_msgs/MagneticField does not."""
+    folder = tmp_path / 'share' / 'some_msgs' / 'msg'
+    folder.mkdir(parents=True)
+    (folder / 'A.msg').write_text('B b\nfloat64 v  # [m]' + end)
+    (folder / 'B.msg').write_text('C c' + end)
+    (folder / 'C.msg').write_text('float32[2] w  # [s]' + end)
+    monkeypatch.setenv('AMENT_PREFIX_PATH', str(tmp_path))
+    text = schema_text.__wrapped__('some_msgs/msg/A')
+    rule = '=' * 80
+    assert [line for line in text.splitlines() if '=' in line or 'MSG' in line] == [
+        *(rule, 'MSG: some_msgs/B'),
+        *(rule, 'MSG: some_msgs/C'),
+    ]
+    read = parse_definition('some_msgs/msg/A', text)
+    assert read == parse_definition('some_msgs/msg/A', text.replace(f'\n{rule}', rule))
+    assert read['some_msgs/msg/A'][1] == ('v', 'float64', None)
 
 
 def test_an_empty_message_may_come_without_its_byte(tmp_path):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import zstandard
 from damadics_fd.bag import BagError, BagWriter, iter_columns, read_columns, write_columns
+from damadics_fd.bag.checking.inspection import inspect
 from damadics_fd.bag.mcap import loading
 from damadics_fd.bag.mcap.reader import McapFile
 from damadics_fd.bag.mcap.writer import McapWriter
@@ -53,6 +54,28 @@ def test_other_cores_that_load_ahead_change_nothing(tmp_path, monkeypatch, threa
     states = np.cumsum([0, *sizes]) // 2
     kept = np.delete(columns['strength'], slice(states[4], states[5]))
     assert (found['strength'] == kept).all()
+
+
+def test_channels_of_one_topic_keep_the_order_of_the_file(tmp_path):
+    made = simulated(600)
+    write_columns(tmp_path / 'one.mcap', {name: made[name] for name in ('stamp', *SIGNALS)})
+    with McapFile(tmp_path / 'one.mcap') as source, (tmp_path / 'two.mcap').open('wb') as stream:
+        (batch,) = source.batches()
+        (schema,), (channel,) = source.schemas.values(), source.channels.values()
+        writer = McapWriter(stream, chunk_size=10_000)
+        kind = writer.add_schema(schema.name, schema.encoding, schema.data)
+        numbers = [
+            writer.add_channel(kind, channel.topic, 'cdr', {'recorded by': name}) for name in 'ab'
+        ]
+        for row, time in enumerate(batch.log_times().tolist()):
+            writer.add_message(numbers[row % 2], batch.message(row), time, time)
+        writer.finish()
+    found = read_columns(tmp_path / 'two.mcap')
+    assert all(found[name].tobytes() == made[name].tobytes() for name in ('stamp', *SIGNALS))
+    report = inspect(tmp_path / 'two.mcap')
+    assert not report.problems
+    assert report.topics['/measurement'].timing.steps_back == 0
+    assert report.topics['/measurement'].count == 600
 
 
 def test_memory_of_a_closed_file_serves_the_next(tmp_path, monkeypatch):

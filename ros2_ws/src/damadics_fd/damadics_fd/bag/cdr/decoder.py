@@ -14,6 +14,7 @@ from damadics_fd.bag.cdr import kernels
 from damadics_fd.bag.cdr.definition import Definition, Member, parse_definition
 from damadics_fd.bag.cdr.gathering import field, same_layout, time
 from damadics_fd.bag.cdr.groups import Alike, first_message
+from damadics_fd.bag.cdr.idl import parse_idl
 from damadics_fd.bag.cdr.kernels import LOG_TIME, Words
 from damadics_fd.bag.cdr.layout import HEADER_SIZE, Layout, Place, layout_of
 from damadics_fd.bag.compressed import is_compressed
@@ -31,6 +32,7 @@ STAMPED = {  # what the types begin with
         Member('nanosec', 'uint32', None),
     ],
 }
+PARSERS = {'ros2msg': parse_definition, 'ros2idl': parse_idl}  # by the encoding of a schema
 STAMP_END = HEADER_SIZE + 8  # [B] in a message
 _ELEMENT = re.compile(r'\.\d+(\.|$)')  # a member of a sequence of messages: no column
 
@@ -55,11 +57,11 @@ class Decoder:
                 f'{channel.topic} is encoded as {channel.message_encoding!r}, not as cdr',
                 mcap.path,
             )
-        if schema is None or schema.encoding != 'ros2msg':
-            raise BagError(f'{channel.topic} has no ros2msg definition', mcap.path)
+        if schema is None or schema.encoding not in PARSERS:
+            raise BagError(f'{channel.topic} has no {" or ".join(PARSERS)} definition', mcap.path)
         try:
-            text = schema.data.decode()
-            self.definition: Definition = parse_definition(schema.name, text)
+            parse = PARSERS[schema.encoding]
+            self.definition: Definition = parse(schema.name, schema.data.decode())
         except (BagError, UnicodeDecodeError) as error:
             raise BagError(f'{channel.topic}: {error}', mcap.path) from error
         self.kind = next(iter(self.definition))  # a foreign name may stand in another form
@@ -117,7 +119,7 @@ class Decoder:
         :raises BagError: where a message does not follow its definition or lacks a field.
         """
         left = np.ones(len(starts), bool)
-        groups: list[tuple[NDArray[np.bool_], Columns]] = []
+        groups: list[tuple[Places, Columns]] = []
         while left.any():
             first = int(left.argmax())
             layout = self._layout(batch.data[starts[first] : starts[first] + sizes[first]])
@@ -127,9 +129,10 @@ class Decoder:
             else:
                 rows = np.zeros(len(left), bool)
             rows[first] = True
-            groups.append((rows, self._columns(batch.words, starts[rows], layout)))
+            columns = self._columns(batch.words, starts[rows], layout)
+            groups.append((np.flatnonzero(rows), columns))
             left &= ~rows
-        columns = groups[0][1] if len(groups) == 1 else _merge(groups)
+        columns = merge(groups)
         columns['log_time'] = batch.words.w8[starts + LOG_TIME].view(np.int64)
         return columns
 
@@ -240,9 +243,11 @@ class Decoder:
         return {name: found[name] for name in chosen if name != 'log_time'}
 
 
-def _merge(groups: list[tuple[NDArray[np.bool_], Columns]]) -> Columns:
-    """Put the messages of several layouts back in order."""
-    order = np.argsort(np.concatenate([np.flatnonzero(rows) for rows, _ in groups]))
+def merge(groups: Sequence[tuple[Places, Columns]]) -> Columns:
+    """Put the messages of several layouts or channels, each with their places, back in order."""
+    if len(groups) == 1:
+        return groups[0][1]
+    order = np.argsort(np.concatenate([rows for rows, _ in groups]))
     names = [name for name in groups[0][1] if all(name in part for _, part in groups)]
     return {name: join([part[name] for _, part in groups])[order] for name in names}
 

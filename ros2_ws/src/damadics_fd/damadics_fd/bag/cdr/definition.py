@@ -91,12 +91,22 @@ def parse_definition(name: str, text: str) -> Definition:
     >>> parse_definition('a/msg/B', 'float64[3] x  # [m]')
     {'a/msg/B': [Member(name='x', type='float64', repeat=3)]}
     """
-    sections = re.split(r'^={80}\r?\nMSG: *(\S+) *\r?$', text, flags=re.MULTILINE)
+    # up to version 0.2.0 the recorder set no line end before it, where a .msg file has none
+    sections = re.split(r'={80}\r?\nMSG: *(\S+) *\r?$', text, flags=re.MULTILINE)
     if len(sections) > 2 * _MOST_TYPES:
         raise BagError(f'the schema of {name} defines more than {_MOST_TYPES} types')
     definition = {full_name(name): _members(sections[0], name.split('/')[0])}
     for kind, body in zip(sections[1::2], sections[2::2], strict=True):
         definition.setdefault(full_name(kind), _members(body, kind.split('/')[0]))
+    return checked(name, definition)
+
+
+def checked(name: str, definition: Definition) -> Definition:
+    """
+    Return the definition of a message.
+
+    :raises BagError: where it is too large or lacks a type.
+    """
     if sum(map(len, definition.values())) > _MOST_MEMBERS:
         raise BagError(f'the schema of {name} has more than {_MOST_MEMBERS} fields')
     for members in definition.values():
@@ -143,7 +153,8 @@ def schema_text(name: str) -> str:
     while waiting:
         kind = waiting.pop(0)
         if kind not in bodies:
-            bodies[kind] = _share_file(kind, '.msg').read_text(encoding='utf-8')
+            body = _share_file(kind, '.msg').read_text(encoding='utf-8')
+            bodies[kind] = body if body.endswith('\n') else body + '\n'  # some files do not
             members = _members(bodies[kind], kind.split('/')[0])
             waiting += [m.type for m in members if '/' in m.type]
     top = bodies.pop(name)

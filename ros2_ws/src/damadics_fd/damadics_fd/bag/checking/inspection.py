@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from damadics_fd.bag.arrays import Columns, Places
 from damadics_fd.bag.batch import Batch
-from damadics_fd.bag.cdr.decoder import Decoder
+from damadics_fd.bag.cdr.decoder import Decoder, merge
 from damadics_fd.bag.checking.stated import read_metadata
 from damadics_fd.bag.checking.timing import Timing
 from damadics_fd.bag.errors import BagError, printable
@@ -139,6 +140,7 @@ def _inspect_file(file: MessageFile, report: Report) -> None:
     decoders: dict[int, Decoder | None] = {}
     for batch in file.batches():
         file.check_batch(batch)
+        times: dict[str, list[tuple[Places, Columns]]] = {}
         for number, rows in batch.by_channel():
             counts[number] += len(rows)
             if number not in file.channels:
@@ -147,7 +149,11 @@ def _inspect_file(file: MessageFile, report: Report) -> None:
                 continue
             if number not in decoders:
                 decoders[number] = _stamp_decoder(file, number)
-            _note(report, file, number, batch, rows, decoders)
+            log_time, stamp = _times(file, number, batch, rows, decoders)
+            name = _topic(report, file, number).name
+            times.setdefault(name, []).append((rows, {'log_time': log_time, 'stamp': stamp}))
+        for name, groups in times.items():
+            report.topics[name].timing.note(**merge(groups))
     for channel in file.channels.values():
         _topic(report, file, channel.id)
     if file.stated:
@@ -177,24 +183,23 @@ def _stamp_decoder(file: MessageFile, number: int) -> Decoder | None:
     return decoder if decoder.is_stamped else None
 
 
-def _note(
-    report: Report,
+def _times(
     file: MessageFile,
     number: int,
     batch: Batch,
-    rows: NDArray[np.int64],
+    rows: Places,
     decoders: dict[int, Decoder | None],
-) -> None:
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return log times and stamps of messages of a channel; `decoders` loses those that fail."""
     log_time = batch.log_times(rows)
-    stamp = log_time
     decoder = decoders[number]
     if decoder:
         try:
             if decoder.is_costly:
-                stamp = decoder.stamps(batch, rows)
-            else:
-                stamp = decoder.decode(batch, batch.starts[rows], batch.sizes[rows])['stamp']
+                return log_time, decoder.stamps(batch, rows)
+            decoded = decoder.decode(batch, batch.starts[rows], batch.sizes[rows])
+            return log_time, decoded['stamp']
         except BagError as error:
             file.problem(batch.offset, error.reason)
             decoders[number] = None
-    _topic(report, file, number).timing.note(log_time, stamp)
+    return log_time, log_time
