@@ -3,6 +3,7 @@
 """What the recorder writes can be read; full disks, lost folders and splits lose nothing."""
 
 import shutil
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from damadics_fd.bag import BagError, BagWriter, read_columns, write_columns
 from damadics_fd.bag.checking.inspection import WHOLE, inspect
 from damadics_fd.bag.mcap.reader import McapFile
-from damadics_fd.bag.mcap.records import Op
+from damadics_fd.bag.mcap.records import MAGIC, Op, record, string
 from damadics_fd.bag.rosbag2 import qos
 from damadics_fd.bag.salvage import salvage
 from damadics_fd.bag.writing.blackbox import BlackBox
@@ -261,3 +262,15 @@ def test_a_chunk_that_is_missing_or_doubled_is_told_by_replay(times, tmp_path, c
     path.write_bytes(data[:begin] + data[begin:end] * times + data[end:])
     replay([str(path), '--mode', 'paper', '--jobs', '1'])
     assert 'warning' in capsys.readouterr().err
+
+
+@plain
+def test_all_messages_of_lost_channels_are_counted(tmp_path):
+    parts = [MAGIC, record(Op.HEADER, string('ros2'), string(''))]
+    for channel in (1, 2, 3, 3):
+        head = struct.pack('<HIQQ', channel, 0, 5, 5)
+        parts.append(record(Op.MESSAGE, head, b'\0\1\0\0' + bytes(8)))
+    parts += [record(Op.DATA_END, bytes(4)), record(Op.FOOTER, bytes(20)), MAGIC]
+    (tmp_path / 'a.mcap').write_bytes(b''.join(parts))
+    (told,) = inspect(tmp_path / 'a.mcap').problems
+    assert '4 messages belong to a channel that is lost' in told

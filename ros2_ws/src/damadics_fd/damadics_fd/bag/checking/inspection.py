@@ -141,17 +141,19 @@ def _inspect_file(file: MessageFile, report: Report) -> None:
     for batch in file.batches():
         file.check_batch(batch)
         times: dict[str, list[tuple[Places, Columns]]] = {}
+        lost = 0
         for number, rows in batch.by_channel():
             counts[number] += len(rows)
             if number not in file.channels:
-                text = f'{len(rows)} messages belong to a channel that is lost'
-                file.problem(batch.offset, text)
+                lost += len(rows)
                 continue
             if number not in decoders:
                 decoders[number] = _stamp_decoder(file, number)
             log_time, stamp = _times(file, number, batch, rows, decoders)
             name = _topic(report, file, number).name
             times.setdefault(name, []).append((rows, {'log_time': log_time, 'stamp': stamp}))
+        if lost:
+            file.problem(batch.offset, f'{lost} messages belong to a channel that is lost')
         for name, groups in times.items():
             report.topics[name].timing.note(**merge(groups))
     for channel in file.channels.values():
