@@ -21,8 +21,8 @@ from damadics_fd.bag.rosbag2 import (
     BagMetadata,
     QosProfile,
     Topic,
-    qos_text,
 )
+from damadics_fd.bag.writing.channels import Channels
 from damadics_fd.bag.writing.latched import Kept, Latched
 from damadics_fd.bag.writing.whole_writes import WholeWrites
 
@@ -72,8 +72,6 @@ class BagWriter:
         self._make_mcap = partial(McapWriter, chunk_size=chunk_size, level=level)
         self._custom_data = dict(custom_data or {})
         self._topics: dict[str, Topic] = {}
-        self._channels: dict[str, int] = {}  # of the present file
-        self._schemas: dict[str, int] = {}
         self._files: list[BagFile] = []
         self._sizes: dict[str, int] = {}  # of the finished files
         self._number = 0
@@ -110,8 +108,7 @@ class BagWriter:
             raise BagError(f'cannot write: {error.strerror}', path) from error
         self._stream, self._described = stream, False
         self._number += 1
-        self._channels.clear()
-        self._schemas.clear()
+        self._channels = Channels(self._mcap)
         self._file = BagFile(name)
         self._files.append(self._file)
         held, self._held = self._held, []
@@ -139,23 +136,6 @@ class BagWriter:
             schema_text(kind)  # refused here rather than with the first message
             self._topics[name] = Topic(name, kind, list(offered_qos), hash_ or type_hash(kind))
         return self._topics[name]
-
-    def _channel(self, topic: Topic) -> int:
-        """Return the channel of a topic in the present file."""
-        channel = self._channels.get(topic.name)
-        if channel is None:
-            if topic.type not in self._schemas:
-                text = schema_text(topic.type).encode()
-                self._schemas[topic.type] = self._mcap.add_schema(topic.type, 'ros2msg', text)
-            metadata = {
-                'offered_qos_profiles': qos_text(topic.offered_qos),
-                'topic_type_hash': topic.type_hash,
-            }
-            channel = self._mcap.add_channel(
-                self._schemas[topic.type], topic.name, 'cdr', metadata
-            )
-            self._channels[topic.name] = channel
-        return channel
 
     def write(self, topic: Topic, data: bytes, log_time: int, publish_time: int) -> None:
         """
@@ -186,7 +166,7 @@ class BagWriter:
             self._latched.keep(Kept(topic, data, log_time, publish_time))
 
     def _put(self, topic: Topic, data: bytes, log_time: int, publish_time: int) -> None:
-        channel = self._channel(topic)
+        channel = self._channels.of(topic)
         self._file.note(topic.name, log_time, log_time, 1)
         self._mcap.add_message(channel, data, log_time, publish_time)
 
@@ -211,7 +191,7 @@ class BagWriter:
         for name, columns in messages.items():
             topic = self._topics[name]
             payloads.append(stamped_encoder(topic.type, frame_id)(columns, stamp))
-            channels.append(self._channel(topic))
+            channels.append(self._channels.of(topic))
             self._file.note(name, int(stamp[0]), int(stamp[-1]), len(stamp))
         self._mcap.add_rows(channels, stamp, payloads)
 
@@ -281,7 +261,7 @@ class BagWriter:
 
     def _finish_file(self) -> None:
         for topic in self._present():
-            self._channel(topic)  # a topic without messages is part of the bag, too
+            self._channels.of(topic)  # a topic without messages is part of the bag, too
         self._stream.restore()
         if not self._described:
             entries = {'serialized_metadata': self._metadata().to_yaml(root=False)}
