@@ -44,6 +44,7 @@ STICK_SLIP = 0.15  # the same of friction, of a stem that only sticks and slips
 FRICTION_SIZE = np.array([SIGN, V, ONE])
 SPRING_SIZE = np.array([X1, ONE])
 ONE_WAY = 0.3  # of a friction change: how much more of it one way than on the mean
+SHOWN, MATTERS = 25.0, 0.2  # evidence, and share of the change, from which it is taken in
 ASIDE = 0.02  # [1] offset that a spring's change may leave: friction that is larger one way
 JOINT_COLUMNS = np.array([X1, ONE, SIGN, V])
 JOINT_EVIDENCE = 60.0  # blocks
@@ -182,7 +183,7 @@ def physical_value(s: State, c: SignatureSettings, m: int, h: int) -> tuple[floa
 @jit
 def size_beside_offset(s: State, c: SignatureSettings, m: int, eps: float) -> None:
     """
-    Size friction and spring anew, each with an offset beside it.
+    Size friction and spring anew, each with an offset beside it, friction if the record shows one.
 
     A valve that rubs more one way pushes as well, and passes for one with more preload, which a
     spring's change would have to hold. Evidence and posteriors stay those of the plain change.
@@ -195,8 +196,10 @@ def size_beside_offset(s: State, c: SignatureSettings, m: int, eps: float) -> No
     iv = precision(s, m, eps)
     change = abs(s.value[m][FRICTION]) * friction_at(s.theta, s.vb[m] / s.ne[m])
     prior = (c.change_std[1], c.change_std[0], max(ONE_WAY * change, SMALL_FRICTION), 1.0)
-    if solve_group(s, m, iv, FRICTION_SIZE, len(FRICTION_SIZE), prior) >= 0.0:
-        share_friction(s, m, len(FRICTION_SIZE), 0.0)
+    alike = solve_group(s, m, iv, FRICTION_SIZE, 2, prior)
+    more = solve_group(s, m, iv, FRICTION_SIZE, 3, prior) - alike
+    if alike >= 0.0 and more > SHOWN and abs(s.work.d[2]) > MATTERS * change:
+        share_friction(s, m, 3, 0.0)
     prior = (c.change_std[2], ASIDE, 1.0, 1.0)
     if solve_group(s, m, iv, SPRING_SIZE, len(SPRING_SIZE), prior) >= 0.0:
         share_spring(s, m, len(SPRING_SIZE), 0.0)
