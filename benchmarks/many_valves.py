@@ -8,38 +8,36 @@ Times are CPU times of whole processes, the sender's not among them; ratios are 
 
 import array
 import os
+import statistics
 import subprocess
-import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import rclpy
+import single_messages
 import yaml
-from damadics_bringup.launcher import arguments_of_all
 from damadics_bringup.processes import executable
 from damadics_fd.core.bank import Bank
 from damadics_fd.core.monitor import monitor_for
 from damadics_fd.core.sample import SIGNALS
 from damadics_fd.core.settings import Settings
 from damadics_fd.ros import qos
-from damadics_fd.store.fleet_file import Valve
 from damadics_fd.store.references import Reference, save_reference
-from damadics_msgs.msg import Estimate, FleetLayout, FleetStatus, Float64Stamped, Measurement
+from damadics_msgs.msg import FleetLayout, FleetStatus
 from damadics_msgs.msg import MeasurementBlock as Block
 from damadics_plant import simulate
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.qos import QoSProfile
-from rclpy.serialization import serialize_message
 
 TICKS = os.sysconf('SC_CLK_TCK')
 ROWS = 1000  # of a block
 TAKEN = ('judged', 'refused by their monitors')
 IDLE = 10.0  # s
 PATIENCE = 180.0  # s
-SINGLE, RATE, SECONDS = 10, 100.0, 8.0  # valves, samples a second and time of single messages
+REPEATS = 8  # of the compiled loops, in turns
 
 
 def cpu(pid: int) -> float:
@@ -98,26 +96,35 @@ def running(words: list[str]) -> Iterator[subprocess.Popen]:
         process.wait(60.0)
 
 
-def loops(valves: int = 10_000) -> dict[str, float]:
+class ColumnLoop:
+    """The compiled loop over the columns of one valve: what all else is compared with."""
+
+    def __init__(self) -> None:
+        run = simulate('random_nominal', model='lugre', rate=200.0, duration=200.0, noise=True)
+        self.settings = Settings.for_mode('monitor', sample_rate=200.0)
+        self.columns = {name: np.array(run.columns[name]) for name in ('stamp', *SIGNALS)}
+        self._chain = monitor_for(self.settings)
+        self._chain.events(self.columns)  # compile
+
+    def time(self) -> float:
+        """Return the CPU time of a sample [s]."""
+        self._chain.reset()
+        began = time.process_time()
+        self._chain.events(self.columns)
+        return (time.process_time() - began) / len(self.columns['stamp'])
+
+
+def loops(column: ColumnLoop, valves: int = 10_000) -> dict[str, float]:
     """Compare the bank's loop, one row of each valve at a time, with the loop over columns."""
-    run = simulate('random_nominal', model='lugre', rate=200.0, duration=200.0, noise=True)
-    settings = Settings.for_mode('monitor', sample_rate=200.0)
-    columns = {name: np.array(run.columns[name]) for name in ('stamp', *SIGNALS)}
-    bank = Bank([settings] * valves)
+    bank = Bank([column.settings] * valves)
     numbers = np.arange(valves)
     single, many = [], []
-    chain = monitor_for(settings)
-    chain.events(columns)  # compile
-    bank.take(numbers[:1], np.zeros(1, np.int64), {'cv': np.full(1, 0.5), 'x1': np.full(1, 0.5)})
-    for first in (0, 10, 20):
-        chain.reset()
-        began = time.process_time()
-        chain.events(columns)
-        single.append((time.process_time() - began) / len(columns['stamp']))
+    for first in range(0, 10 * (REPEATS + 1), 10):
+        single.append(column.time())
         instants = [
             (
-                np.full(valves, columns['stamp'][n + 1]),
-                {name: np.full(valves, columns[name][n + 1]) for name in SIGNALS},
+                np.full(valves, column.columns['stamp'][n + 1]),
+                {name: np.full(valves, column.columns[name][n + 1]) for name in SIGNALS},
             )
             for n in range(first, first + 10)
         ]
@@ -125,7 +132,12 @@ def loops(valves: int = 10_000) -> dict[str, float]:
         for stamp, signals in instants:
             bank.take(numbers, stamp, signals)
         many.append((time.process_time() - began) / (10 * valves))
-    return {'column_loop_us': 1e6 * min(single), 'kernel_us': 1e6 * min(many)}
+    pairs = list(zip(many, single, strict=True))[1:]  # in the first the memory is new
+    return {
+        'kernel_over_column_loop': statistics.median(a / b for a, b in pairs),
+        'kernel_us': 1e6 * statistics.median(many[1:]),
+        'column_loop_us': 1e6 * statistics.median(single),
+    }
 
 
 def write_list(folder: Path, valves: int, mode: str) -> Path:
@@ -151,8 +163,14 @@ def write_list(folder: Path, valves: int, mode: str) -> Path:
     return path
 
 
-def fleet(folder: Path, valves: int, mode: str, samples: int) -> dict[str, float]:
-    """Start the process `fleet`, leave it idle, send it blocks as fast as it takes them."""
+def fleet(
+    folder: Path, valves: int, mode: str, samples: int, between: Callable[[], float]
+) -> dict[str, float]:
+    """
+    Start the process `fleet`, leave it idle, send it blocks as fast as it takes them.
+
+    :param between: measures something else after each eighth of the samples.
+    """
     listener = Listener()
     for kind, topic, profile in (
         (FleetLayout, 'fleet/layout', qos.FLAG),
@@ -177,29 +195,34 @@ def fleet(folder: Path, valves: int, mode: str, samples: int) -> dict[str, float
             run = simulate('f16_B', rate=1.0, duration=800.0, noise=True, seed=7)
         version = listener.latest['fleet/layout'].version
         sent = 0
-        before, blocks = cpu(process.pid), 0
         numbers = array.array('I', np.arange(valves, dtype=np.uint32).tobytes())
-        instant = 0
-        while sent < samples:
-            message = Block(layout=version)
-            message.header.frame_id = 'bench'
-            instants = max(1, ROWS // valves)
-            at = slice(instant, instant + instants)
-            instant += instants
-            message.valve = numbers * instants
-            message.stamp = array.array('q', np.repeat(run.columns['stamp'][at], valves).tobytes())
-            for name in SIGNALS:
-                column = np.repeat(np.asarray(run.columns[name][at], np.float64), valves)
-                setattr(message, name, array.array('d', column.tobytes()))
-            publisher.publish(message)
-            sent += len(message.stamp)
-            blocks += 1
-            if blocks % 50 == 0:
-                listener.spin(0.05)
-        deadline = time.monotonic() + PATIENCE
-        while listener.judged() < sent and time.monotonic() < deadline:
-            listener.spin(0.2)
-        used = cpu(process.pid) - before
+        instant = blocks = 0
+        used, ratios = 0.0, []
+        for part in range(1, REPEATS + 1):
+            before, first = cpu(process.pid), sent
+            while sent < part * samples // REPEATS:
+                message = Block(layout=version)
+                message.header.frame_id = 'bench'
+                instants = max(1, ROWS // valves)
+                at = slice(instant, instant + instants)
+                instant += instants
+                message.valve = numbers * instants
+                stamps = np.repeat(run.columns['stamp'][at], valves)
+                message.stamp = array.array('q', stamps.tobytes())
+                for name in SIGNALS:
+                    column = np.repeat(np.asarray(run.columns[name][at], np.float64), valves)
+                    setattr(message, name, array.array('d', column.tobytes()))
+                publisher.publish(message)
+                sent += len(message.stamp)
+                blocks += 1
+                if blocks % 50 == 0:
+                    listener.spin(0.05)
+            deadline = time.monotonic() + PATIENCE
+            while listener.judged() < sent and time.monotonic() < deadline:
+                listener.spin(0.2)
+            spent = cpu(process.pid) - before
+            used += spent
+            ratios.append(spent / (sent - first) / between())
         judged = listener.judged()
         began = time.monotonic()
     ended = time.monotonic() - began
@@ -209,93 +232,10 @@ def fleet(folder: Path, valves: int, mode: str, samples: int) -> dict[str, float
         'idle_percent': 100.0 * idle,
         'memory_mb': memory,
         'us': 1e6 * used / sent,
+        'ratio': statistics.median(ratios),
         'lost': sent - judged,
         'end_s': ended,
     }
-
-
-def single_messages(words: list[str], heard: bool) -> float:
-    """Send each of some valves its samples; return CPU time of a process per sample [us]."""
-    listener = Listener()
-    names = [f'lv{n:05d}' for n in range(SINGLE)]
-    publishers = [
-        listener.node.create_publisher(Measurement, f'/{name}/measurement', qos.SAMPLES)
-        for name in names
-    ]
-    ears = []
-    with running(words) as process:
-        listener.wait(lambda: all(p.get_subscription_count() == 1 for p in publishers))
-        if heard:
-            ears = [subprocess.Popen([sys.executable, __file__, 'listen', *names])]
-        listener.spin(5.0)
-        before, sent = cpu(process.pid), 0
-        began = time.monotonic()
-        message = Measurement(cv=0.5, x1=0.5, p1=3.5e6, p2=2.6e6, t1=20.0, flow=5.0, ps=1e5)
-        while sent < SECONDS * RATE:
-            sent += 1
-            message.header.stamp.sec, message.header.stamp.nanosec = divmod(
-                int(sent * 1e9 / RATE), 10**9
-            )
-            data = serialize_message(message)
-            for publisher in publishers:
-                publisher.publish(data)
-            time.sleep(max(0.0, began + sent / RATE - time.monotonic()))
-        time.sleep(1.0)
-        used = cpu(process.pid) - before
-        for ear in ears:
-            ear.send_signal(2)
-            ear.wait()
-    listener.node.destroy_node()
-    return 1e6 * used / (sent * SINGLE)
-
-
-def listen(names: list[str]) -> None:
-    """Subscribe to what the monitors of valves say of each sample, as a recorder does."""
-    rclpy.init()
-    node = rclpy.create_node('ears')
-    for name in names:
-        for kind, topic in (
-            (Estimate, 'estimate'),
-            (Float64Stamped, 'residual'),
-            (Float64Stamped, 'threshold'),
-        ):
-            node.create_subscription(
-                kind, f'/{name}/{topic}', lambda data: None, qos.SAMPLES, raw=True
-            )
-    with suppress(KeyboardInterrupt):
-        rclpy.spin(node)
-
-
-def relay(names: list[str]) -> None:
-    """Take the samples of valves and send as many prepared bytes, and nothing else."""
-    from damadics_fd.ros.spin import spin
-
-    class Relay(rclpy.node.Node):
-        finished, exit_code = False, 0
-
-        def __init__(self) -> None:
-            super().__init__('relay')
-            data = serialize_message(Estimate())
-            for name in names:
-                out = self.create_publisher(Estimate, f'/{name}/estimate', qos.SAMPLES)
-                self.create_subscription(
-                    Measurement,
-                    f'/{name}/measurement',
-                    lambda _, out=out: out.publish(data),
-                    qos.SAMPLES,
-                    raw=True,
-                )
-
-    spin(Relay)
-
-
-def apart(words: list[str]) -> None:
-    """Run monitors in one process whose estimates go over DDS, as before they were joined."""
-    from damadics_fd.nodes import joint, monitors
-
-    monitors.Joints = lambda: None  # each node then has joints of its own
-    assert joint.Joints is not None
-    sys.exit(monitors.main(words))
 
 
 def figures(folder: Path) -> dict[str, float]:
@@ -306,27 +246,15 @@ def figures(folder: Path) -> dict[str, float]:
     :return: figures by name.
     """
     rclpy.init()
-    found = loops()
-    many = fleet(folder, 1000, 'monitor', 2_000_000)
-    few = fleet(folder, 10, 'monitor', 1000)
-    scada = fleet(folder, 200, 'scada', 140_000)
-    valves = [
-        Valve(f'lv{n:05d}', settings={'sample_rate': RATE, 'alarm_folder': '', 'mode': 'monitor'})
-        for n in range(SINGLE)
-    ]
-    words = arguments_of_all(valves, '/bench')
-    joined = [executable('damadics_fd', 'monitors'), *words]
-    names = [valve.name for valve in valves]
-    relayed = single_messages([sys.executable, __file__, 'relay', *names], heard=False)
-    silent = single_messages(joined, heard=False)
-    heard = single_messages(joined, heard=True)
-    before = single_messages([sys.executable, __file__, 'apart', *words], heard=True)
+    column = ColumnLoop()
+    found = loops(column)
+    many = fleet(folder, 1000, 'monitor', 2_000_000, column.time)
+    few = fleet(folder, 10, 'monitor', 8000, column.time)
+    scada = fleet(folder, 200, 'scada', 140_000, column.time)
+    single = single_messages.figures()
     rclpy.shutdown()
     return {
-        'joined_over_relay': silent / relayed,
-        'joined_heard_over_before': heard / before,
-        'blocks_over_column_loop': many['us'] / found['column_loop_us'],
-        'kernel_over_column_loop': found['kernel_us'] / found['column_loop_us'],
+        'blocks_over_column_loop': many['ratio'],
         'valves_per_core_200hz': 1e6 / (200.0 * many['us']),
         'valves_per_core_1hz_scada': 1e6 / scada['us'],
         'idle_percent_per_valve': many['idle_percent'] / 1000.0,
@@ -336,13 +264,6 @@ def figures(folder: Path) -> dict[str, float]:
         **found,
         'blocks_us': many['us'],
         'scada_us': scada['us'],
-        'relay_us': relayed,
-        'joined_us': silent,
-        'joined_heard_us': heard,
-        'before_heard_us': before,
         'end_1000_s': many['end_s'],
+        **single,
     }
-
-
-if __name__ == '__main__':
-    {'listen': listen, 'relay': relay, 'apart': apart}[sys.argv[1]](sys.argv[2:])

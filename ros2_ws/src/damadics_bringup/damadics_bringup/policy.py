@@ -87,6 +87,7 @@ EXPOSED = (
     'estimate',
     'residual',
     'threshold',
+    'stroke_request',
 )
 FLEET_TOPICS = tuple(f'fleet/{name}' for name in ('layout', 'status', 'fault_event', 'isolation'))
 FLEET_SERVICES = tuple(
@@ -145,11 +146,11 @@ def policy(
         for valve in group
     }
     if blocks:
-        exposed = _all(valves, Rights(EXPOSED, ('measurement',)))
+        exposed = _all(valves, Rights(EXPOSED, ('measurement',), ('partial_stroke',)))
         rights = Rights(
             (*FLEET_TOPICS, 'operator_action', '/diagnostics', *exposed.publish),
             ('fleet/layout', 'measurement_block', *exposed.subscribe),
-            FLEET_SERVICES,
+            (*FLEET_SERVICES, *exposed.reply),
         )
         _enclave(enclaves, '/', 'fleet', _of_root(rights))
     nodes = {name: one for name, one in NODES.items() if not (blocks and name in MONITORS)}
@@ -238,6 +239,7 @@ def _all(valves: Iterable[Valve], rights: Rights) -> Rights:
     return Rights(
         publish=[name for one in each for name in one.publish],
         subscribe=[name for one in each for name in one.subscribe],
+        reply=[name for one in each for name in one.reply],
         request=[name for one in each for name in one.request],
     )
 

@@ -22,7 +22,7 @@ from damadics_fd.nodes.detector_report import report_of
 from damadics_fd.nodes.joint import Joints, Taker
 from damadics_fd.nodes.managed import MonitoringNode
 from damadics_fd.nodes.operator import OperatorActions, OperatorServices
-from damadics_fd.nodes.partial_strokes import PartialStrokes, StrokeLimits
+from damadics_fd.nodes.partial_strokes import AMPLITUDES, USUAL, PartialStrokes, StrokeLimits
 from damadics_fd.nodes.second_publisher import RivalWatch
 from damadics_fd.nodes.signature_publisher import SignaturePublisher, read_causes
 from damadics_fd.ros import qos
@@ -93,9 +93,9 @@ class DetectorNode(MonitoringNode):
             ),
             self.parameters.declare(
                 'partial_stroke_limit',
-                0.1,
+                USUAL,
                 'greatest amplitude of a partial stroke, share of full travel',
-                limits=(0.001, 0.5),
+                limits=AMPLITUDES,
             ),
         )
 
@@ -139,7 +139,12 @@ class DetectorNode(MonitoringNode):
         actions = OperatorActions(self, made, self.actuator, acts)
         OperatorServices(made, actions, self._core, self._operated)
         self._strokes = PartialStrokes(
-            made, actions, self._core, self._stroke_limits, lambda: self._blind
+            made,
+            actions,
+            self._core,
+            self._stroke_limits,
+            lambda: self._blind,
+            lambda: self._judged > 0,
         )
         made.every(min(self.watch.timeout / 5.0, HEARTBEAT), self._look)
         made.every(HEARTBEAT, self._beat)

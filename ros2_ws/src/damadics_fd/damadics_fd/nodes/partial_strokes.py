@@ -27,12 +27,16 @@ ALLOWED, NOT_ALLOWED, UNDER_WAY = 'allowed', 'not allowed', 'under way'  # in th
 SEEN = 0.5  # of the amplitude: a stem that goes so far to both sides has made a stroke
 
 
+AMPLITUDES = (0.001, 0.5)  # that `partial_stroke_limit` may allow
+USUAL = 0.1
+
+
 @dataclass(frozen=True)
 class StrokeLimits:
     """What a request may ask for."""
 
-    allowed: bool
-    amplitude: float  # greatest, share of full travel
+    allowed: bool = False
+    amplitude: float = USUAL  # greatest, share of full travel
 
 
 @dataclass
@@ -56,6 +60,10 @@ class PartialStrokes:
     :param core: the detector.
     :param limits: what may be asked for.
     :param blind: tells whether the latest judgement says nothing about now.
+    :param judged: tells whether there is an estimate at all.
+    :param place: namespace of the valve, where it is not that of the node.
+    :param tag: of the actuator, until an estimate brings another.
+    :param changed: called with True when strokes begin, with False when they end.
     """
 
     def __init__(
@@ -65,16 +73,23 @@ class PartialStrokes:
         core: Detector,
         limits: StrokeLimits,
         blind: Callable[[], bool],
+        judged: Callable[[], bool],
+        *,
+        place: str = '',
+        tag: str = '',
+        changed: Callable[[bool], None] = lambda going: None,
     ) -> None:
         self._actions = actions
         self._core = core
         self._limits = limits
         self._blind = blind
-        self._judged = False
+        self._judged = judged
+        self._place, self._changed = place, changed
         self._strokes: Strokes | None = None
-        self._message, self._tag = StrokeRequest(), ''
-        self._publisher = entities.publisher(StrokeRequest, 'stroke_request', qos.COMMANDS)
-        entities.service(PartialStroke, 'partial_stroke', self._serve)
+        self._message, self._tag = StrokeRequest(), tag
+        under = f'{place}/' if place else ''
+        self._publisher = entities.publisher(StrokeRequest, f'{under}stroke_request', qos.COMMANDS)
+        entities.service(PartialStroke, f'{under}partial_stroke', self._serve)
         entities.on_release(lambda: self.end('the monitor was stopped'))
 
     def follow(self, estimate: Estimate, frame_id: str) -> None:
@@ -84,7 +99,7 @@ class PartialStrokes:
         :param estimate: the newest.
         :param frame_id: tag of the actuator.
         """
-        self._judged, self._tag = True, frame_id
+        self._tag = frame_id
         strokes = self._strokes
         if strokes is None:
             return
@@ -109,7 +124,7 @@ class PartialStrokes:
     @property
     def _estimate(self) -> Estimate | None:
         """The estimate that was judged last."""
-        return self._core.estimate if self._judged else None
+        return self._core.estimate if self._judged() else None
 
     def end(self, cause: str) -> None:
         """
@@ -137,10 +152,23 @@ class PartialStrokes:
         s = self._core.state[0]
         return bool(s.active or s.latched)
 
+    def _set(self, strokes: Strokes | None) -> None:
+        self._strokes = strokes
+        self._changed(strokes is not None)
+
     def _finish(self, done: bool, text: str) -> None:
-        self._strokes = None
-        stamp = self._estimate.stamp if self._estimate else 0
-        self._actions.tell(OperatorAction.PARTIAL_STROKE, done, text, stamp=stamp)
+        self._set(None)
+        self._tell(done, text)
+
+    def _tell(self, done: bool, text: str, user: str = '', comment: str = '') -> None:
+        self._actions.tell(
+            OperatorAction.PARTIAL_STROKE,
+            done,
+            f'{self._place}: {text}' if self._place else text,
+            stamp=self._estimate.stamp if self._estimate else 0,
+            user=user,
+            comment=comment,
+        )
 
     def _serve(
         self, request: PartialStroke.Request, response: PartialStroke.Response
@@ -149,25 +177,19 @@ class PartialStrokes:
         response.message = self._refusal(request)
         response.success = not response.message
         if response.success and request.count == 0:
-            self._strokes = None
+            self._set(None)
             self._send(0.0, 0)
             response.message = 'the driver was asked to end the partial strokes'
         elif response.success and estimate:
             self._message.request += 1
-            self._strokes = Strokes(request.count, request.amplitude, estimate.x1, estimate.stamp)
+            amplitude, began = request.amplitude, estimate.stamp
+            self._set(Strokes(request.count, amplitude, estimate.x1, began))
             self._send(request.amplitude, request.count)
             response.message = (
                 f'the driver was asked for {request.count} partial strokes of '
                 f'+-{100.0 * request.amplitude:g} %'
             )
-        self._actions.tell(
-            OperatorAction.PARTIAL_STROKE,
-            response.success,
-            response.message,
-            stamp=estimate.stamp if estimate else 0,
-            user=request.user,
-            comment=request.comment,
-        )
+        self._tell(response.success, response.message, request.user, request.comment)
         return response
 
     def _refusal(self, request: PartialStroke.Request) -> str:

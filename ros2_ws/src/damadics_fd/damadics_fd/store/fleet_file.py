@@ -47,6 +47,11 @@ class Valve:
     simulate: Mapping[str, Plain] = field(default_factory=dict)
     area: str = ''  # part of the plant
 
+    @property
+    def file(self) -> str:
+        """Name of its files."""
+        return self.name.replace('/', '__')
+
     def settings_of(self, node: str) -> Saved:
         """
         Return the settings of one node of the valve.
@@ -127,10 +132,14 @@ def _mapping(entry: Plain) -> Saved:
 
 
 def _shared(valves: list[Valve]) -> list[str]:
-    """Find references that two valves would overwrite in turn."""
+    """Find files that two valves would overwrite in turn."""
     owner: dict[str, str] = {}
+    named: dict[str, str] = {}
     problems = []
     for valve in valves:
+        other = named.setdefault(valve.file, valve.name)
+        if other != valve.name:
+            problems.append(f'{valve.name}: its files have the names of those of {other}')
         reference = str(valve.settings.get('reference') or '')
         if reference and reference in owner:
             problems.append(f'{valve.name}: {owner[reference]} has the reference {reference} too')

@@ -108,3 +108,12 @@ def test_the_file_of_a_valve_says_what_differs_and_comes_back():
 def test_a_file_without_parameters_is_refused(content):
     with pytest.raises(SettingsError, match='ros__parameters'):
         ValveDocument.read(content)
+
+
+@pytest.mark.parametrize(
+    ('wrong', 'word'),
+    [({'t_learn': 200.0}, 't_learn'), ({'t_w': 700.0}, 't_learn'), ({'stem_play': 0.04}, 'play')],
+)
+def test_what_makes_no_monitor_of_a_control_room_is_refused_with_the_other_settings(wrong, word):
+    with pytest.raises(SettingsError, match=word):
+        Settings.for_mode('scada', **wrong)

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A fleet tells causes of valves in mode scada in its events, as a detector does."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from damadics_fd.causes import load_causes
@@ -42,7 +44,8 @@ def test_the_cause_comes_with_the_events_of_the_valve():
     members = Members([Member('/lv1', 'LV-1', '', Settings.for_mode('scada'), None, '')])
     wire = Wire()
     keeping = Keeping(wire, members, None)
-    telling = Telling(wire, wire, members, keeping, Ages(np.ones(1), False, 0.0), load_causes())
+    ages, none = Ages(np.ones(1), False, 0.0), SimpleNamespace(under_way=set())
+    telling = Telling(wire, wire, members, keeping, ages, load_causes(), none)
     for first in range(0, len(run['stamp']), PIECE):
         piece = slice(first, first + PIECE)
         stamp = run['stamp'][piece]

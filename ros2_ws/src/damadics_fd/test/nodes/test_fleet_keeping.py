@@ -3,6 +3,7 @@
 """References of a fleet: saved when learned, not when loaded, and never in the samples' way."""
 
 import logging
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -48,7 +49,8 @@ def fleet(folder):
     wire = Wire()
     keeping = Keeping(wire, members, None)
     ages = Ages(np.ones(VALVES), False, 0.0)
-    return members, keeping, Telling(wire, wire, members, keeping, ages, load_causes())
+    none = SimpleNamespace(under_way=set())
+    return members, keeping, Telling(wire, wire, members, keeping, ages, load_causes(), none)
 
 
 def judge(telling, columns, first, end):

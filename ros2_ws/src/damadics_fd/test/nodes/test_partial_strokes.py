@@ -29,7 +29,12 @@ class Bench:
         )
         actions = SimpleNamespace(tell=lambda _, done, text, **more: self.told.append(text))
         self.strokes = PartialStrokes(
-            entities, actions, core, StrokeLimits(allowed, 0.1), lambda: self.blind
+            entities,
+            actions,
+            core,
+            StrokeLimits(allowed),
+            lambda: self.blind,
+            lambda: hasattr(core, 'estimate'),
         )
 
     def see(self, x1=0.5, at=0.0):

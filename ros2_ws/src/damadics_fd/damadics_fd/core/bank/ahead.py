@@ -27,24 +27,21 @@ CACHE = 1 << 22  # bytes of records that the cache holds: nothing is to be fetch
 
 
 class Part(NamedTuple):
-    """Name the bytes of each record of an array that a sample needs."""
+    """Name the fields of each record of an array that a sample needs, as they lie in a row."""
 
     records: Array
-    first: int = 0
-    end: int | None = None  # None: up to the end of the record
+    first: str = ''  # '': from the begin of the record
+    last: str = ''  # '': up to the end of the record
 
+    def bytes_of(self) -> tuple[int, int]:
+        """
+        Return where the fields lie.
 
-def offset_of(kind: np.dtype[np.void], name: str) -> int:
-    """
-    Return where a field of a record begins.
-
-    :param kind: of the record.
-    :param name: of the field.
-    :return: bytes from the begin of the record.
-    """
-    fields = kind.fields
-    assert fields is not None
-    return fields[name][1]
+        :return: the first byte in a record, and the one behind the last.
+        """
+        fields = self.records.dtype.fields or {}
+        kind, behind = fields[self.last][:2] if self.last else (self.records.dtype, 0)
+        return fields[self.first][1] if self.first else 0, behind + kind.itemsize
 
 
 def places(parts: Iterable[Part]) -> Ints:
@@ -58,11 +55,12 @@ def places(parts: Iterable[Part]) -> Ints:
     """
     found: list[tuple[int, int]] = []
     needed = 0
-    for records, first, end in parts:
-        size = records.dtype.itemsize
-        offsets = range(first, size if end is None else end, LINE)
-        found += [(records.ctypes.data + offset, size) for offset in offsets]
-        needed += len(records) * len(offsets) * LINE
+    for part in parts:
+        first, behind = part.bytes_of()
+        offsets = [*range(first, behind, LINE), behind - 1]  # a record may begin within a line
+        start, size = part.records.ctypes.data, part.records.dtype.itemsize
+        found += [(start + offset, size) for offset in offsets]
+        needed += len(part.records) * len(offsets) * LINE
     return np.array(found if needed > CACHE else [], np.int64).reshape(-1, 2)
 
 

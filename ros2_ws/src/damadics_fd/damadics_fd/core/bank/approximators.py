@@ -8,7 +8,7 @@ from contextlib import contextmanager
 import numpy as np
 
 from damadics_fd.core.approximator.estimator import Estimator
-from damadics_fd.core.bank.ahead import Part, offset_of, places
+from damadics_fd.core.bank.ahead import Part, places
 from damadics_fd.core.bank.held import Held
 from damadics_fd.core.bank.rows import Reasons, take_approximator
 from damadics_fd.core.decision.events import Decision
@@ -28,17 +28,17 @@ class Approximators(Held):
         super().__init__(settings, classes)
         firsts = stacked(Estimator(one).state for one in self.settings)
         self.states = firsts[self.which]
-        kind = self.signatures.dtype
-        theta, now, work = (offset_of(kind, name) for name in ('theta', 'now', 'work'))
-        self.ahead = places(
+        self.ahead = places(  # of fields that nearly every sample needs
             [
                 Part(self.quality),
-                Part(self.states),
-                Part(self.detectors),
+                Part(self.states, last='travel'),
+                Part(self.states, 'y'),
+                Part(self.detectors, last='near_misses'),
+                Part(self.detectors, 'shelved_until'),
                 Part(self.estimates),
                 Part(self.decisions),
-                Part(self.signatures, 0, theta),  # what lies between is needed now and then
-                Part(self.signatures, now, work),
+                Part(self.signatures, last='run'),
+                Part(self.signatures, 'own', 'confidence'),
             ]
         )
         self._room = np.empty(0, Decision.dtype())  # for decisions, kept from call to call

@@ -7,6 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
+from damadics_fd.core.settings.control_room import LEAST_LEARNING, WIDE_PLAY
 from damadics_fd.core.valve.parameters import Valve
 
 
@@ -39,7 +40,7 @@ class ScadaSettings:
     learn_s: float = 900.0
     days_per_false_alarm: float = 30.0
     sigma: float = 0.001414
-    wide_play: float = 0.03
+    wide_play: float = WIDE_PLAY
     gap_s: float = 30.0
     settle_s: float = 120.0
     saturated: tuple[float, float] = (0.94, 0.97)
@@ -54,7 +55,7 @@ class ScadaSettings:
             f'{name} is {value}: give more than {low:g}'
             for name, value, low in (
                 ('period_s', self.period_s, 0.0),
-                ('learn_s', self.learn_s, self.learn_from_s + 239.0),
+                ('learn_s', self.learn_s, self.learn_from_s + LEAST_LEARNING),
                 ('days_per_false_alarm', self.days_per_false_alarm, 0.0),
                 ('sigma', self.sigma, 0.0),
                 ('wide_play', self.wide_play, self.actuator.stem_play),

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from damadics_fd.core.field import Section, number
 
 SCADA = ('scada',)
+LEAST_LEARNING = 239.0  # s between t_w and t_learn
+WIDE_PLAY = 0.03  # of the stroke; of the second model of the friction test
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -10,7 +10,7 @@ from damadics_fd.core.field import Given, Section, SettingsError, Value, wrong_c
 from damadics_fd.core.modes import MODES
 from damadics_fd.core.record import Plain
 from damadics_fd.core.settings.approximation import Approximation
-from damadics_fd.core.settings.control_room import ControlRoom
+from damadics_fd.core.settings.control_room import LEAST_LEARNING, WIDE_PLAY, ControlRoom
 from damadics_fd.core.settings.deciding import Deciding
 from damadics_fd.core.settings.explaining import Explaining
 from damadics_fd.core.settings.learning_time import LearningTime
@@ -212,6 +212,19 @@ def _contradictions(s: Settings) -> list[str]:
                 s.consistent or s.velocity == 'super_twisting',
                 'consistent is off: the filter lag '
                 'would show as a fault; switch it on or choose velocity super_twisting',
+            ),
+        ]
+    if s.mode == 'scada':
+        checks += [
+            (
+                s.t_learn > s.t_w + LEAST_LEARNING,
+                f't_learn is not more than {LEAST_LEARNING:g} s after t_w: mode scada learns that '
+                'long',
+            ),
+            (
+                s.stem_play < WIDE_PLAY,
+                f'stem_play is not below {WIDE_PLAY:g}: the friction test compares with a play of '
+                'that size',
             ),
         ]
     return [text for holds, text in checks if not holds]

@@ -24,6 +24,7 @@ from damadics_fd.nodes.fleet.keeping import Keeping
 from damadics_fd.nodes.fleet.members import Happening, Members, members_of
 from damadics_fd.nodes.fleet.services import FleetServices
 from damadics_fd.nodes.fleet.signatures import Signatures
+from damadics_fd.nodes.fleet.strokes import FleetStrokes
 from damadics_fd.nodes.fleet.telling import Telling
 from damadics_fd.nodes.operator import OperatorActions
 from damadics_fd.nodes.signature_publisher import read_causes
@@ -111,8 +112,18 @@ class FleetNode(SpinnableNode):
         self._gathered: list[tuple[int, Sample]] = []
         self._jumps = Jumps(len(self._members))
         self._entities = Entities(self)
+        self._actions = OperatorActions(self, self._entities, 'fleet', self._acts)
+        self._strokes = FleetStrokes(
+            self._entities, self._actions, self._members, self._keeping, self._blind
+        )
         self._telling = Telling(
-            self, self._entities, self._members, self._keeping, self._ages, self._causes
+            self,
+            self._entities,
+            self._members,
+            self._keeping,
+            self._ages,
+            self._causes,
+            self._strokes,
         )
         self._signatures = Signatures(
             self, self._entities, self._members, folder, self._causes.limits
@@ -123,8 +134,7 @@ class FleetNode(SpinnableNode):
         made = self._entities
         self._layout = made.publisher(FleetLayout, 'fleet/layout', qos.FLAG)
         self._status = made.publisher(FleetStatus, 'fleet/status', qos.FLAG)
-        actions = OperatorActions(self, made, 'fleet', self._acts)
-        FleetServices(made, actions, self._members, self._keeping, self._tell_all)
+        FleetServices(made, self._actions, self._members, self._keeping, self._tell_all)
         self._diagnostics = Diagnostics(self, made, 'fleet', self._report)
         self._telling.expose(exposed, self._gather)
         self._signatures.restore(range(exposed))
@@ -202,6 +212,11 @@ class FleetNode(SpinnableNode):
         message.header.stamp = self.get_clock().now().to_msg()
         self._status.publish(message)
         self._telling.beat(ages)
+        self._strokes.look()
+
+    def _blind(self, number: int) -> bool:
+        """Tell whether the newest sample of a valve is too old, or there is none."""
+        return not self._telling.ages()[number] <= self._ages.limits[number]
 
     def _report(self) -> Report:
         blind = int(np.count_nonzero(~(self._telling.ages() <= self._ages.limits)))

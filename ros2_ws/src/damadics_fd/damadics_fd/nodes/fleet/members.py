@@ -20,6 +20,7 @@ from damadics_fd.core.settings.document import parameters_in
 from damadics_fd.core.signature.state import NO_CLASSES
 from damadics_fd.core.text import NAME, plain
 from damadics_fd.nodes.fleet.blocks import Rows
+from damadics_fd.nodes.partial_strokes import AMPLITUDES, USUAL, StrokeLimits
 from damadics_fd.store.fleet_file import FleetError, Valve
 
 OF_NODES = (  # parameters of the per-valve nodes of which a fleet has its own
@@ -45,6 +46,7 @@ class Member:
     settings: Settings
     reference: Path | None  # without ".a.json"
     measurement: str  # topic
+    strokes: StrokeLimits = StrokeLimits()
 
     @property
     def file(self) -> str:
@@ -182,6 +184,7 @@ def _members(valves: Sequence[Valve], problems: list[str]) -> Iterator[Member]:
             given |= valve.settings
             actuator = plain(str(given.pop('actuator', '') or valve.name), NAME)
             reference = given.pop('reference', None)
+            strokes = _stroke_limits(given)
             values = {name: value for name, value in given.items() if name not in OF_NODES}
             unknown = sorted(set(values) - known)
             if unknown:
@@ -200,7 +203,24 @@ def _members(valves: Sequence[Valve], problems: list[str]) -> Iterator[Member]:
             settings,
             Path(str(reference)).expanduser() if reference else None,
             valve.topics.get('measurement', f'/{valve.name}/measurement'),
+            strokes,
         )
+
+
+def _stroke_limits(given: Saved) -> StrokeLimits:
+    """Take out of what is given for a valve what people may ask it for."""
+    allowed = given.pop('allow_partial_stroke', False)
+    amplitude = given.pop('partial_stroke_limit', USUAL)
+    problems = []
+    if not isinstance(allowed, bool):
+        problems.append(f'allow_partial_stroke = {allowed!r} is neither true nor false')
+    low, high = AMPLITUDES
+    if not isinstance(amplitude, int | float) or not low <= amplitude <= high:
+        problems.append(f'partial_stroke_limit = {amplitude!r} is not within {low} .. {high}')
+        amplitude = USUAL
+    if problems:
+        raise SettingsError(problems)
+    return StrokeLimits(bool(allowed), float(amplitude))
 
 
 def _parameters(path: Path) -> Saved:

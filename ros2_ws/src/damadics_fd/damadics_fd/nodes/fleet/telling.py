@@ -21,6 +21,7 @@ from damadics_fd.nodes.fleet.blocks import Rows
 from damadics_fd.nodes.fleet.exposed import Exposed
 from damadics_fd.nodes.fleet.keeping import Keeping
 from damadics_fd.nodes.fleet.members import Happening, Members, Taken
+from damadics_fd.nodes.fleet.strokes import FleetStrokes
 from damadics_fd.ros import qos
 from damadics_fd.ros.conversions import (
     event_message,
@@ -41,6 +42,7 @@ class Telling:
     :param keeping: their alarms.
     :param ages: of their samples.
     :param causes: texts and advice.
+    :param strokes: partial strokes, for which samples are followed one by one.
     """
 
     def __init__(
@@ -51,6 +53,7 @@ class Telling:
         keeping: Keeping,
         ages: Ages,
         causes: CauseTable,
+        strokes: FleetStrokes,
     ) -> None:
         self._node = node
         self._entities = entities
@@ -58,10 +61,11 @@ class Telling:
         self._keeping = keeping
         self._ages = ages
         self._causes = causes
+        self._strokes = strokes
         self._event = entities.publisher(FleetEvent, 'fleet/fault_event', qos.EVENTS)
         self._isolation = entities.publisher(FleetIsolation, 'fleet/isolation', qos.EVENTS)
         self._exposed: dict[int, Exposed] = {}
-        self._watched: list[int] = []
+        self._watched: set[int] = set()
         self._judgements: dict[int, Judgement] = {}  # the latest of mode scada, by valve
         self._live: dict[int, LiveJudgement] = {}  # of valves in mode scada that had an alarm
 
@@ -77,14 +81,15 @@ class Telling:
 
     def judge(self, rows: Rows) -> Taken:
         """
-        Have rows judged; those of valves that somebody listens to one by one, and published.
+        Have rows judged; those of valves that are watched one by one, and published.
 
         :param rows: checked rows.
         :return: what became of them.
         """
-        if not self._watched:
+        followed = self._watched | self._strokes.under_way
+        if not followed:
             return self._members.take(rows)
-        watched = np.isin(rows.valve, self._watched)
+        watched = np.isin(rows.valve, list(followed))
         if not watched.any():
             return self._members.take(rows)
         parts = [self._members.take(_some(rows, ~watched))] if not watched.all() else []
@@ -95,7 +100,10 @@ class Telling:
                 number = int(rows.valve[row])
                 bank, place = self._members.at(number)
                 decision = Decision(*bank.decisions[place].item())
-                self._exposed[number].sample(Estimate(*bank.estimates[place].item()), decision)
+                estimate = Estimate(*bank.estimates[place].item())
+                if number in self._watched:
+                    self._exposed[number].sample(estimate, decision)
+                self._strokes.follow(number, estimate)
         return Taken(
             [one for part in parts for one in part.happened],
             sum(part.refused for part in parts),
@@ -148,7 +156,7 @@ class Telling:
 
         :param ages: of all valves.
         """
-        self._watched = [n for n, one in self._exposed.items() if one.watched]
+        self._watched = {n for n, one in self._exposed.items() if one.watched}
         self._look_at_faults()
         for number in self._exposed:
             self._flag(number, ages[number])
