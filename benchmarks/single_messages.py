@@ -54,7 +54,7 @@ class Tested:
         quiet = {'stdout': subprocess.DEVNULL, 'stderr': subprocess.DEVNULL}
         self._context = Context()
         rclpy.init(context=self._context, domain_id=domain)
-        self._node = rclpy.create_node('bench', context=self._context)
+        self._node = rclpy.create_node(f'bench_{domain}', context=self._context)
         self._publishers = [
             self._node.create_publisher(Measurement, f'/{name}/measurement', qos.SAMPLES)
             for name in NAMES

@@ -204,6 +204,8 @@ def test_all_mistakes_in_a_fleet_are_listed(tmp_path):
                     'lv4': {'topics': {'measurment': '/x'}},
                     'lv5': {'settings': {'reference': 'r'}},
                     'lv6': {'settings': {'reference': 'r'}},
+                    'area/lv7': {},
+                    'area__lv7': {},
                 }
             }
         )
@@ -216,9 +218,10 @@ def test_all_mistakes_in_a_fleet_are_listed(tmp_path):
         'none.yaml does not',
         'lv4: there is no topic measurment',
         'lv6: lv5 has the reference r too',
+        'area__lv7: its files have the names of those of area/lv7',
     ):
         assert cause in str(caught.value)
-    for text in ('', 'valves: []', 'valves: {a: [1]}', ': :'):
+    for text in ('', 'valves: []', 'valves: {a: [1]}', ': :', 'valves: {a: {}, b: {}, a: {}}'):
         path.write_text(text)
         with pytest.raises(FleetError):
             read_fleet(path)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from damadics_msgs.msg import Estimate as EstimateMessage
-from damadics_msgs.msg import FaultEvent, FaultFlag, Float64Stamped, Isolation
+from damadics_msgs.msg import FaultEvent, FaultFlag, Isolation
 
 from damadics_fd.causes import explain
 from damadics_fd.core.approximator.state import Estimate
@@ -20,9 +20,10 @@ from damadics_fd.core.text import SENTENCE, plain
 from damadics_fd.nodes.alarm_memory import AlarmMemory
 from damadics_fd.nodes.detector_report import report_of
 from damadics_fd.nodes.joint import Joints, Taker
+from damadics_fd.nodes.judged_samples import JudgedSamples
 from damadics_fd.nodes.managed import MonitoringNode
 from damadics_fd.nodes.operator import OperatorActions, OperatorServices
-from damadics_fd.nodes.partial_strokes import AMPLITUDES, USUAL, PartialStrokes, StrokeLimits
+from damadics_fd.nodes.partial_strokes import PartialStrokes, declared_limits
 from damadics_fd.nodes.second_publisher import RivalWatch
 from damadics_fd.nodes.signature_publisher import SignaturePublisher, read_causes
 from damadics_fd.ros import qos
@@ -34,7 +35,8 @@ from damadics_fd.ros.conversions import (
     write_flag,
 )
 from damadics_fd.ros.diagnostics import Level, Report
-from damadics_fd.ros.raw import Encoder, any_estimate, stamp_of
+from damadics_fd.ros.entities import ASKED_EVERY
+from damadics_fd.ros.raw import any_estimate, stamp_of
 from damadics_fd.ros.spin import spin
 from damadics_fd.store.alarms import default_folder
 
@@ -55,6 +57,8 @@ class DetectorNode(MonitoringNode):
     :param arguments: ROS arguments of this node alone; those of the process by default.
     :param joints: with the estimators of the same process.
     """
+
+    _taker: Taker
 
     def __init__(self, arguments: list[str] | None = None, joints: Joints | None = None) -> None:
         self._joints = joints or Joints()
@@ -87,17 +91,7 @@ class DetectorNode(MonitoringNode):
             'folder that keeps signature and trends over a restart; '
             '"auto": beside the alarms, in mode paper none; "": none',
         )
-        self._stroke_limits = StrokeLimits(
-            self.parameters.declare(
-                'allow_partial_stroke', False, 'pass requests for partial strokes on to the driver'
-            ),
-            self.parameters.declare(
-                'partial_stroke_limit',
-                USUAL,
-                'greatest amplitude of a partial stroke, share of full travel',
-                limits=AMPLITUDES,
-            ),
-        )
+        self._stroke_limits = declared_limits(self.parameters)
 
     def make(self) -> None:
         """Begin afresh, with the alarms from before where they are kept."""
@@ -109,14 +103,9 @@ class DetectorNode(MonitoringNode):
         self._was_silent = True
         self._live = LiveJudgement(self._core)
         self._tag = ''
-        self._encode = Encoder()
         self._flag = FaultFlag()
         self._flag.header.frame_id = self.actuator
-        on_request = made.publisher_on_request
-        self._residual, self._residual_heard = on_request(Float64Stamped, 'residual', qos.SAMPLES)
-        self._threshold, self._threshold_heard = on_request(
-            Float64Stamped, 'threshold', qos.SAMPLES
-        )
+        self._samples = JudgedSamples(made)
         self._fault_flag = made.publisher(FaultFlag, 'fault_flag', qos.FLAG)
         self._fault_event = made.publisher(FaultEvent, 'fault_event', qos.EVENTS)
         self._isolation = made.publisher(Isolation, 'isolation', qos.FLAG)
@@ -145,6 +134,7 @@ class DetectorNode(MonitoringNode):
             self._stroke_limits,
             lambda: self._blind,
             lambda: self._judged > 0,
+            changed=lambda going: self._taker.tell_each(),
         )
         made.every(min(self.watch.timeout / 5.0, HEARTBEAT), self._look)
         made.every(HEARTBEAT, self._beat)
@@ -204,8 +194,7 @@ class DetectorNode(MonitoringNode):
             return None
         self._memory.begin(estimate.stamp)
         self._signature.begin(estimate.stamp)
-        before = self._decision
-        if self._judged and before and estimate.stamp == before.stamp:
+        if self._judged and estimate.stamp == self.last:
             self._twice += 1  # two estimators send
             return None
         learns = self.phase == PHASE_MONITOR and estimate.phase < PHASE_MONITOR
@@ -217,17 +206,12 @@ class DetectorNode(MonitoringNode):
 
     def _judged_beside(self, stamp: int, tag: str, news: int) -> None:
         """Publish what an estimator of this process has had judged, an ordinary estimate."""
-        self.watch.heard_beside(self._taker.watch)
-        self._judged += 1
-        self.last, self._unread = stamp, True
+        taker = self._taker
+        taker.ordinary += 1
+        self._settle()
+        self.last, self.unread = stamp, True
         moved = tag != self._tag
-        if (
-            news
-            or moved
-            or self._was_silent
-            or self._residual_heard.count
-            or self._threshold_heard.count
-        ):
+        if news or moved or self._was_silent or self._samples.heard:
             self._publish(tag, bool(news & SHOWN))
             if news & HAPPENED:
                 self._happened(tag)
@@ -235,31 +219,40 @@ class DetectorNode(MonitoringNode):
             self._signature.update(stamp, tag)
         if moved or self._strokes.under_way:
             self._strokes.follow(self._core.estimate, tag)
+        if self._was_silent or self._strokes.under_way or self._samples.heard:
+            taker.tell_each()
+        else:
+            taker.rest(self.watch.wall + ASKED_EVERY, tag, self._signature.told)
+
+    def _settle(self) -> None:
+        """Count the samples of which the estimator beside had nothing to tell."""
+        taker = self._taker
+        if taker.ordinary:
+            self._judged += taker.ordinary
+            taker.ordinary = 0
+            self.watch.heard_beside(taker.watch)
 
     @property
     def core(self) -> Detector:
-        """The detector of this node."""
+        """The detector."""
         return self._core
 
     @property
-    def _decision(self) -> Decision | None:
-        """The latest decision; it is read where it is needed."""
-        if self._unread:
+    def _decision(self) -> Decision | None:  # read where it is needed
+        if self.unread:
             self._decision = self._core.decision
         return self._known
 
     @_decision.setter
     def _decision(self, decision: Decision | None) -> None:
-        self._known, self._unread = decision, False
+        self._known, self.unread = decision, False
 
     def _publish(self, tag: str, changed: bool) -> None:
         """Publish residual and threshold to who listens, and the flag where it has changed."""
         if self._tag != tag:
             self._tag = self._flag.header.frame_id = tag
-        if self._residual_heard.count and (decision := self._decision):
-            self._residual.publish(self._encode(decision.stamp, tag, decision.residual))
-        if self._threshold_heard.count and (decision := self._decision):
-            self._threshold.publish(self._encode(decision.stamp, tag, decision.threshold))
+        if self._samples.heard and (decision := self._decision):
+            self._samples.publish(decision, tag)
         turned = self._was_silent and self._look()
         if changed and not turned:
             self._publish_flag()
@@ -286,6 +279,7 @@ class DetectorNode(MonitoringNode):
     @property
     def _blind(self) -> bool:
         """Whether the latest judgement says nothing about now."""
+        self._settle()
         return (
             not self.active
             or self.watch.silent
@@ -298,6 +292,7 @@ class DetectorNode(MonitoringNode):
         turned = self._was_silent != self._blind
         if turned:
             self._was_silent = not self._was_silent
+            self._taker.tell_each()
             if self._was_silent:
                 self._strokes.end('the valve is not seen any more')
             self._publish_flag()
@@ -327,6 +322,7 @@ class DetectorNode(MonitoringNode):
 
     def report(self) -> Report:
         """Say what is judged."""
+        self._settle()
         decision = self._decision
         more = self.commissioned | self._strokes.values
         if decision is None:

@@ -81,7 +81,7 @@ class EstimatorNode(MonitoringNode):
         self._core.reset()
         self._encoder = EstimateEncoder()
         self._joint = self._joints.at(self.resolve_topic_name('estimate'))
-        self._pair: tuple[Taker, Pair] | None = None
+        self._pair: tuple[Taker, Pair | None] | None = None
         self._last, self._phase = self._core.phase, -1
         self._refused_at = -math.inf  # monotonic time of the last refused sample [s]
         self._frozen = FrozenPosition()
@@ -103,12 +103,29 @@ class EstimatorNode(MonitoringNode):
     def _take(self, sample: Sample, tag: str) -> None:
         if not self.active:
             return
-        self._frozen.note(sample.stamp, sample.cv, sample.x1)
+        self._frozen.waiting.append(sample)
         taker = self._joint.only
-        if taker is not None and taker.beside is not None and taker.beside.active:
-            estimate = self._judged_at_once(sample, tag, taker, taker.beside)
-            if estimate is None:
-                return
+        if taker is not None and (beside := taker.beside) is not None and beside.active:
+            made = self._pair
+            if made is None or made[0] is not taker:
+                made = self._pair_with(taker, beside)
+            if pair := made[1]:
+                known = self._phase if self._phase == beside.phase else -1
+                news = pair.take(sample, known, beside.last)
+                if (
+                    news == 0
+                    and self.watch.wall < taker.until
+                    and taker.first <= sample.stamp < taker.end
+                    and tag == taker.tag
+                ):  # as nearly always: there is nothing to tell
+                    beside.last, beside.unread = sample.stamp, True
+                    taker.ordinary += 1
+                    return
+                estimate = self._judged_at_once(sample, tag, taker, news)
+                if estimate is None:
+                    return
+            else:
+                estimate = self._core.update(*sample)
         else:
             estimate = self._core.update(*sample)
         if isinstance(estimate, Refused):
@@ -127,23 +144,27 @@ class EstimatorNode(MonitoringNode):
             if learned:
                 self._reference.keep()
 
+    def _pair_with(self, taker: Taker, beside: Beside) -> tuple[Taker, Pair | None]:
+        """Join with the only detector beside, where the mode lets it judge with the sample."""
+        core = self._core
+        taker.watch = self.watch
+        self._pair = taker, Pair(core, beside.core) if isinstance(core, Estimator) else None
+        return self._pair
+
     def _judged_at_once(
-        self, sample: Sample, tag: str, taker: Taker, beside: Beside
+        self, sample: Sample, tag: str, taker: Taker, news: int
     ) -> Estimate | Refused | None:
-        """Let the only detector judge what is ordinary with the sample; None where it was."""
-        core, paired = self._core, self._pair
-        if not isinstance(core, Estimator):
-            return core.update(*sample)
-        if paired is None or paired[0] is not taker:
-            paired = self._pair = taker, Pair(core, beside.core)
-            taker.watch = self.watch
-        phase = self._phase
-        news = paired[1].take(sample, phase if phase == beside.phase else -1, beside.last)
+        """Tell what the detector has judged with the sample; None where it has."""
+        core = self._core
+        assert isinstance(core, Estimator)
         if news >= 0:
-            if self._listeners.count > 1:
+            heard = self._listeners.count > 1
+            if heard:
                 taker.sent(sample.stamp)
                 self._publisher.publish(self._encoder.encode(core.latest, tag))
             taker.judged(sample.stamp, tag, news)
+            if heard:
+                taker.tell_each()
             return None
         if news == ESTIMATED:
             return core.latest
@@ -188,11 +209,11 @@ class EstimatorNode(MonitoringNode):
         counters = self._core.counters
         good = self._core.monitoring
         failed, failing = self._core.failed_input, self._core.failing
+        frozen = self._frozen.problem
         values = {
             'NE 107': self._class_of(failing, good),
             'Phase': self._core.phase,
-            'Learning progress (%)': 100.0
-            * (self._core.progress if counters['accepted'] else 0.0),
+            'Learning progress (%)': 100.0 * (self._progress if counters['accepted'] else 0.0),
             'Last refused': self._core.last_rejection or 'none',
             **{f'Samples {name.replace("_", " ")}': count for name, count in counters.items()},
         }
@@ -205,9 +226,14 @@ class EstimatorNode(MonitoringNode):
             return Level.WARN, f'samples refused: {explanation}', values
         if self._reference.problem:
             return Level.WARN, self._reference.problem, values
-        if good and self._frozen.problem:
-            return Level.WARN, self._frozen.problem, values
+        if good and frozen:
+            return Level.WARN, frozen, values
         return Level.OK if good else Level.WARN, self._core.status, values
+
+    @property
+    def _progress(self) -> float:
+        core = self._core
+        return core.latest.progress if isinstance(core, Estimator) else core.progress
 
     def _class_of(self, failing: Refused | None, good: bool) -> str:
         if failing:

@@ -4,6 +4,7 @@
 
 import math
 
+from damadics_fd.core.sample import Sample
 from damadics_fd.core.stamps import SECOND
 
 LONG = 3.0  # s
@@ -19,6 +20,7 @@ class FrozenPosition:
         self._since = 0.0  # stamp [s]
         self._low = self._high = math.nan
         self._now = 0.0
+        self.waiting: list[Sample] = []  # what is noted when somebody asks
 
     def note(self, stamp: int, cv: float, x1: float) -> None:
         """
@@ -42,6 +44,9 @@ class FrozenPosition:
     @property
     def problem(self) -> str:
         """What is wrong, '' if nothing."""
+        waiting, self.waiting[:] = self.waiting.copy(), []
+        for sample in waiting:
+            self.note(sample.stamp, sample.cv, sample.x1)
         still, moved = self._now - self._since, self._high - self._low
         if still < LONG or not moved > MOVED:
             return ''

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Take an input and watch it: silence, a second publisher, refused QoS, lost messages."""
 
+import math
 import time
 from collections.abc import Callable
 from typing import Protocol, TypeVar
@@ -61,12 +62,12 @@ class InputWatch:
         self.max_age = float('inf')  # [s] from which a judgement is not healthy
         self._entities = entities
         self._node = node
-        self._topic = topic
+        self._topic, self._name = topic, node.resolve_topic_name(topic)
         self._command = command
         self._slow = PERIODS * period
         self._clock = node.get_clock()
         self._simulated = bool(node.get_parameter('use_sim_time').value)
-        self._wall: float | None = None  # monotonic time of the last message [s]
+        self.wall = -math.inf  # monotonic time of the last message [s]
         self._ros = 0  # ROS time of the last message [ns]
         self._ros_seen = 0
         self._ros_moved = 0.0  # monotonic time of the last motion of ROS time [s]
@@ -97,37 +98,37 @@ class InputWatch:
         """
         jumps: ForwardJumps[S] = ForwardJumps()
         self._far = lambda: jumps.refused
-        fresh = self._own.heard
-
-        def heard(item: S, tag: str) -> None:
-            self._wall = now = time.monotonic()
-            self._fresh = self._own
-            if self._simulated:
-                self._ros = self._clock.now().nanoseconds
-            if tag != self._tag:
-                self._tag = plain(tag, NAME)
-            if jumps.passes(item.stamp, now):
-                fresh(item.stamp, now)
-                take(item, self._tag)
-                return
-            for admitted in jumps.admit(item.stamp, item, now):
-                fresh(admitted.stamp, now)
-                take(admitted, self._tag)
+        fresh = self._own.waiting.append
 
         def handed(item: S, tag: str) -> None:
-            self._wall = now = time.monotonic()
+            self.wall = now = time.monotonic()
             if self._simulated:
                 self._ros = self._clock.now().nanoseconds
             if tag != self._tag:
                 self._tag = plain(tag, NAME)
             self._fresh = self._own
-            fresh(item.stamp, now)
+            fresh((item.stamp, now))
             take(item, self._tag)
 
-        def arrived(data: bytes) -> None:
-            found = read(bytes(data))
-            if found:
-                heard(*found)
+        def arrived(data: bytes) -> None:  # as little as may be: it is called for each sample
+            found = read(data)
+            if not found:
+                return
+            item, tag = found
+            self.wall = now = time.monotonic()
+            self._fresh = self._own
+            if self._simulated:
+                self._ros = self._clock.now().nanoseconds
+            if tag != self._tag:
+                self._tag = plain(tag, NAME)
+            stamp = item.stamp
+            if jumps.passes(stamp, now):
+                fresh((stamp, now))
+                take(item, self._tag)
+                return
+            for admitted in jumps.admit(stamp, item, now):
+                fresh((admitted.stamp, now))
+                take(admitted, self._tag)
 
         events = SubscriptionEventCallbacks(
             incompatible_qos=self._incompatible, message_lost=self._count_lost
@@ -141,20 +142,20 @@ class InputWatch:
 
         :param other: it has just heard it.
         """
-        self._wall, self._ros, self._fresh = other._wall, other._ros, other._fresh
+        self.wall, self._ros, self._fresh = other.wall, other._ros, other._fresh
 
     @property
     def age(self) -> float:
         """Time since the last message [s], infinite before the first."""
-        if self._wall is None:
+        if self.wall == -math.inf:
             return float('inf')
         now = time.monotonic()
         if not self._simulated:
-            return now - self._wall
+            return now - self.wall
         ros = self._clock.now().nanoseconds
         if ros != self._ros_seen:
             self._ros_seen, self._ros_moved = ros, now
-        stopped = now - max(self._ros_moved, self._wall)
+        stopped = now - max(self._ros_moved, self.wall)
         return max(max(ros - self._ros, 0) * 1e-9, stopped)
 
     @property
@@ -165,7 +166,7 @@ class InputWatch:
     @property
     def lag(self) -> float:
         """Age of the newest sample by its stamp [s]; below 0 in the future, 0 before any."""
-        if self._wall is None:
+        if self.wall == -math.inf:
             return 0.0
         return self._fresh.age(self._clock.now().nanoseconds, time.monotonic())
 
@@ -222,10 +223,6 @@ class InputWatch:
             'Messages lost': self._lost,
         }
 
-    @property
-    def _name(self) -> str:
-        return self._node.resolve_topic_name(self._topic)
-
     def _incompatible(self, event: Incompatible) -> None:
         policy = QoSPolicyKind(event.last_policy_kind).name.lower()
         self._mismatch = (
@@ -245,7 +242,7 @@ class InputWatch:
         if self.silent:
             self._timer.timer_period_ns = int(NEXT_WORDS * 1e9)
             self._timer.reset()  # the turn that is under way would still be the short one
-            since = 'waiting for' if self._wall is None else 'nothing comes any more on'
+            since = 'waiting for' if self.wall == -math.inf else 'nothing comes any more on'
             self._node.get_logger().warning(f'{since} {self._name}: {self._command}')
         else:
             self._timer.timer_period_ns = int(FIRST_WORD * 1e9)

@@ -6,6 +6,7 @@ Estimator and detector of one valve in one process: estimates go from one to the
 Over DDS this hop costs more than everything else that a sample needs.
 """
 
+import math
 from collections import deque
 from collections.abc import Callable
 from typing import Protocol
@@ -25,6 +26,7 @@ class Beside(Protocol):
     active: bool
     last: int  # stamp of its latest decision [ns]; -1 where there is none
     phase: int  # of the latest estimate
+    unread: bool  # its latest decision was made with the sample
 
     @property
     def core(self) -> Detector:
@@ -38,7 +40,8 @@ class Taker:
     :param take: called with each estimate and its tag.
     :param hear: called with each judgement, where the mode has any.
     :param beside: the detector, where its estimates may be judged with the samples.
-    :param judged: called after that, with stamp, tag and the bits of `Pair.take`.
+    :param judged: called after that, with stamp, tag and the bits of `Pair.take`; not for each
+        sample of which there is nothing to tell.
     """
 
     watch: InputWatch  # of the estimator beside
@@ -52,6 +55,25 @@ class Taker:
     ) -> None:
         self.take, self.hear, self.beside, self.judged = take, hear, beside, judged
         self._echoes: deque[int] = deque(maxlen=MOST_ECHOES)
+        self.ordinary = 0  # samples that `judged` was not called for
+        self.tag = ''  # that it was called with
+        self.until = -math.inf  # monotonic time up to which it need not be called [s]
+        self.first, self.end = 0, 0  # stamps for which it need not be called [ns]
+
+    def tell_each(self) -> None:
+        """Call `judged` for each sample from now on."""
+        self.until = -math.inf
+
+    def rest(self, until: float, tag: str, stamps: tuple[int, int]) -> None:
+        """
+        Call `judged` no more for a while, but for news.
+
+        :param until: monotonic time of the end [s].
+        :param tag: of the samples for which that holds.
+        :param stamps: the first of them, and the one behind the last [ns].
+        """
+        self.until, self.tag = until, tag
+        self.first, self.end = stamps
 
     def sent(self, stamp: int) -> None:
         """

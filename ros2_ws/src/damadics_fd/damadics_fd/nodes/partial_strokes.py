@@ -20,6 +20,7 @@ from damadics_fd.nodes.operator import OperatorActions
 from damadics_fd.ros import qos
 from damadics_fd.ros.conversions import set_stamp
 from damadics_fd.ros.entities import Entities
+from damadics_fd.ros.parameters import Parameters
 
 MOST_STROKES = 20  # of one request
 PATIENCE = 30.0  # s that a stroke may take
@@ -37,6 +38,26 @@ class StrokeLimits:
 
     allowed: bool = False
     amplitude: float = USUAL  # greatest, share of full travel
+
+
+def declared_limits(parameters: Parameters) -> StrokeLimits:
+    """
+    Declare what a request may ask for.
+
+    :param parameters: of the node.
+    :return: the limits.
+    """
+    return StrokeLimits(
+        parameters.declare(
+            'allow_partial_stroke', False, 'pass requests for partial strokes on to the driver'
+        ),
+        parameters.declare(
+            'partial_stroke_limit',
+            USUAL,
+            'greatest amplitude of a partial stroke, share of full travel',
+            limits=AMPLITUDES,
+        ),
+    )
 
 
 @dataclass

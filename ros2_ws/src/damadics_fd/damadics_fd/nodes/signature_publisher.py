@@ -141,7 +141,13 @@ class SignaturePublisher:
         :param stamp: of the measurement [ns].
         :return: True where `update` would publish without news.
         """
-        return not self._next - PERIOD <= stamp < self._next
+        first, end = self.told
+        return not first <= stamp < end
+
+    @property
+    def told(self) -> tuple[int, int]:
+        """Stamps of the second that the last message stands for [ns]."""
+        return self._next - PERIOD, self._next
 
     def update(self, stamp: int, tag: str) -> None:
         """

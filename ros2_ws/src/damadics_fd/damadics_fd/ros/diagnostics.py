@@ -4,6 +4,7 @@
 
 from collections.abc import Callable, Mapping
 from enum import IntEnum
+from functools import lru_cache
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from rclpy.node import Node
@@ -41,6 +42,7 @@ class Diagnostics:
         self._hardware_id = hardware_id
         self._report = report
         self._level: Level | None = None
+        self._values: dict[str, KeyValue] = {}  # kept: to make them anew each second costs more
         self._board = entities.board(self._status)
 
     def publish(self) -> None:
@@ -53,10 +55,19 @@ class Diagnostics:
         return DiagnosticStatus(
             level=bytes([level]),
             name=self._name,
-            message=plain(message, SENTENCE),
+            message=_plain(message),
             hardware_id=self._hardware_id,
-            values=[KeyValue(key=key, value=_text(value)) for key, value in values.items()],
+            values=[self._valued(key, value) for key, value in values.items()],
         )
+
+    def _valued(self, key: str, value: object) -> KeyValue:
+        text = _text(value)
+        known = self._values.get(key)
+        if known is None:
+            known = self._values[key] = KeyValue(key=key)
+        if known.value != text:
+            known.value = text
+        return known
 
     def check(self) -> None:
         """Publish at once if the level has changed since the last message."""
@@ -65,4 +76,11 @@ class Diagnostics:
 
 
 def _text(value: object) -> str:
-    return f'{value:.6g}' if isinstance(value, float) else plain(str(value), SENTENCE)
+    if isinstance(value, float):
+        return f'{value:.6g}'
+    return str(value) if isinstance(value, int) else _plain(str(value))
+
+
+@lru_cache(4096)  # most texts are those of a second ago
+def _plain(text: str) -> str:
+    return plain(text, SENTENCE)

@@ -21,7 +21,6 @@ TOPICS = (
     'fault_flag',
     'fault_event',
 )
-_LOADER = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)  # thousands of valves in a second
 ENTRIES = {
     'parameters': str,
     'settings': dict,
@@ -34,6 +33,22 @@ OF_NODE = {'reference': 'estimator', 'alarm_folder': 'detector'}  # the rest is 
 
 class FleetError(ValueError):
     """The list of valves is wrong; the message has a line for every mistake."""
+
+
+class _Loader(getattr(yaml, 'CSafeLoader', yaml.SafeLoader)):  # type: ignore[misc]
+    """Read thousands of valves in a second; refuse a name that stands twice, which YAML drops."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> Saved:
+        names: set[str] = set()
+        for key, _ in node.value:
+            name = str(key.value)
+            if name in names:
+                raise yaml.constructor.ConstructorError(
+                    None, None, f'{name} stands twice in one mapping', key.start_mark
+                )
+            names.add(name)
+        found: Saved = super().construct_mapping(node, deep)
+        return found
 
 
 @dataclass(frozen=True)
@@ -75,7 +90,7 @@ def read_fleet(path: Path | str) -> list[Valve]:
     path = Path(path)
     try:
         text = path.read_text()
-        content = yaml.load(text, Loader=_LOADER)
+        content = yaml.load(text, Loader=_Loader)
     except OSError as problem:
         raise FleetError(f'{path}: {problem.strerror}') from problem
     except yaml.YAMLError as problem:

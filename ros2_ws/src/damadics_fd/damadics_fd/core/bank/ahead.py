@@ -39,9 +39,17 @@ class Part(NamedTuple):
 
         :return: the first byte in a record, and the one behind the last.
         """
-        fields = self.records.dtype.fields or {}
-        kind, behind = fields[self.last][:2] if self.last else (self.records.dtype, 0)
-        return fields[self.first][1] if self.first else 0, behind + kind.itemsize
+        kind = self.records.dtype
+        begin = _field(kind, self.first)[1] if self.first else 0
+        last, end = _field(kind, self.last) if self.last else (kind, 0)
+        return begin, end + last.itemsize
+
+
+def _field(kind: np.dtype[np.void], name: str) -> tuple[np.dtype[np.generic], int]:
+    """Return the kind of a field of a record, and where it begins [B]."""
+    assert kind.fields is not None
+    found, offset = kind.fields[name][:2]
+    return found, offset
 
 
 def places(parts: Iterable[Part]) -> Ints:
