@@ -39,6 +39,22 @@ def test_errors_are_one_line_on_stderr(args, reason, tmp_path, capsys, monkeypat
 
 
 @pytest.mark.parametrize(
+    ('name', 'content', 'reason'),
+    [
+        ('a.xlsx', b'PK\x03\x04 and so on', 'is a spreadsheet; save it as CSV'),
+        ('a.xls', b'\xd0\xcf\x11\xe0 and so on', 'is a file of Excel; save it as CSV'),
+        ('a.mat', b'MATLAB 5.0 MAT-file', 'is a file of MATLAB; save it as CSV or Parquet'),
+        ('a.h5', b'\x89HDF\r\n\x1a\n', 'is HDF5, as MATLAB writes it; save it as CSV'),
+        ('a.feather', b'ARROW1\0\0', 'is an Arrow file; save it as Parquet'),
+    ],
+)
+def test_tables_of_other_programs_are_told_with_a_remedy(name, content, reason, tmp_path, capsys):
+    (tmp_path / name).write_bytes(content)
+    assert main([str(tmp_path / name)]) == 1
+    assert capsys.readouterr().err.startswith(f'replay: {tmp_path / name}: {reason}')
+
+
+@pytest.mark.parametrize(
     ('content', 'reason'),
     [
         (None, 'holds no .mcap file; give a bag, or a folder of bags'),

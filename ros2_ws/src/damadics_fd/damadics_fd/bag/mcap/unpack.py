@@ -21,7 +21,12 @@ _FOREIGN = {
     b'#ROSBAG ': 'is a ROS 1 bag; convert it: rosbags-convert --dst-storage mcap',
     b'PK\x03\x04': 'is a ZIP archive; unpack it first',
     b'\x1f\x8b': 'is compressed by gzip; unpack it first',
+    b'\xd0\xcf\x11\xe0': 'is a file of Excel; save it as CSV',
+    b'MATLAB 5': 'is a file of MATLAB; save it as CSV or Parquet: writetable',
+    b'\x89HDF': 'is HDF5, as MATLAB writes it; save it as CSV or Parquet',
+    b'ARROW1': 'is an Arrow file; save it as Parquet',
 }
+_SHEETS = ('.xlsx', '.xlsm', '.ods')  # ZIP archives, too
 
 
 class Slot:
@@ -120,6 +125,8 @@ def open_plain(path: Path, limits: Limits) -> BinaryIO:
         with stream:
             return unpacked(stream, path, limits)
     foreign = next((text for magic, text in _FOREIGN.items() if start.startswith(magic)), '')
+    if foreign and path.suffix.lower() in _SHEETS:
+        foreign = 'is a spreadsheet; save it as CSV'
     if foreign or not start:
         stream.close()
         raise BagError(foreign or 'is empty', path)
