@@ -231,6 +231,24 @@ def test_judgements_out_survive_the_broker_and_say_when_we_are_gone(
     detectors.close()
 
 
+def test_who_was_dropped_with_nothing_to_publish_comes_back(processes, domain, tmp_path, broker):
+    config = {'broker': f'mqtt://127.0.0.1:{broker.port}', 'out': {'prefix': 'fd'}}
+    start(processes, tmp_path, config)
+    reader = Program(broker.port, 'fd/status')
+    assert wait_for(lambda: reader.of('fd/status')[-1:] == [b'monitored'], 30.0)
+    heard, joined = len(reader.got), reader.joined
+    broker.kill()
+    broker.start()
+    assert wait_for(lambda: reader.joined > joined, 30.0)
+    assert wait_for(lambda: len(reader.got) > heard, 30.0), 'it has said again that it is there'
+    assert reader.of('fd/status')[-1] == b'monitored'
+    broker.kill()
+    log = processes.log('mqtt')
+    assert wait_for(lambda: 'nobody listens' in log.read_text(), 30.0)
+    assert 'password' not in log.read_text(), 'nobody has refused us'
+    reader.close()
+
+
 def test_a_wrong_password_is_told_without_it(processes, domain, tmp_path):
     (tmp_path / 'users').write_text('plant:$6$rounds=1000$abcdefgh$nothing\n')
     server = Server(tmp_path, 'mqtt_broker.py', tmp_path / 'users')

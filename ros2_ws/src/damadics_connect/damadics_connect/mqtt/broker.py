@@ -10,6 +10,7 @@ from typing import NamedTuple
 from urllib.parse import urlsplit
 
 from aiomqtt import Client, Will
+from aiomqtt.exceptions import MqttConnectError
 
 from damadics_connect.settings import Secret, Section
 from damadics_connect.source_clock import NANO
@@ -141,7 +142,7 @@ def why(problem: BaseException) -> str:
     """
     code = getattr(problem, 'rc', None)
     number = getattr(code, 'value', code)
-    if isinstance(number, int) and number in REMEDIES:
+    if isinstance(problem, MqttConnectError) and number in REMEDIES:  # else: numbers of paho
         return REMEDIES[number]
     behind = problem.__cause__ or problem.__context__  # the client raises its own "from None"
     if isinstance(behind, OSError) and behind is not problem:

@@ -17,7 +17,7 @@ from collections.abc import Callable
 from aiomqtt import Client, MqttError, Will
 
 from damadics_connect.judgement import Judgement, Transition, as_json
-from damadics_connect.mqtt.broker import PAUSES, Broker, why
+from damadics_connect.mqtt.broker import PAUSES, Broker, Pulse, why
 
 WAITING = 10_000  # transitions kept while there is no broker
 LOST, PRESENT = b'not_monitored', b'monitored'
@@ -74,11 +74,15 @@ class Outgoing:
                     self._changed.update(self._valves)
                     self.connected, self.fault = True, ''
                     self._log(f'publishing to {self._broker.shown}: {self._prefix}/...')
+                    pulse = asyncio.create_task(Pulse().keep(client))
                     try:
-                        await self._publish(client)
+                        await self._publish(client, pulse)
                     except asyncio.CancelledError:
                         await client.publish(status, LOST, qos=1, retain=True)
                         raise
+                    finally:
+                        pulse.cancel()
+                        await asyncio.gather(pulse, return_exceptions=True)
             except (MqttError, OSError) as problem:
                 reason = f'{self._broker.shown}: {why(problem)}'
                 if reason != self.fault:
@@ -88,8 +92,10 @@ class Outgoing:
             await asyncio.sleep(PAUSES[min(failures, len(PAUSES) - 1)])
             failures += 1
 
-    async def _publish(self, client: Client) -> None:
+    async def _publish(self, client: Client, pulse: asyncio.Task[None]) -> None:
         while True:
+            if pulse.done():
+                pulse.result()  # the broker has dropped us, though there was nothing to publish
             while self._events:
                 event = self._events[0]
                 topic = f'{self._prefix}/{event.valve}/event'
