@@ -11,7 +11,6 @@ from damadics_msgs.msg import FaultEvent, FaultFlag, Isolation
 
 from damadics_fd.causes import explain
 from damadics_fd.core.approximator.state import Estimate
-from damadics_fd.core.bank.pair import HAPPENED, SHOWN, SIGNED
 from damadics_fd.core.decision.detector import Detector, Outcome
 from damadics_fd.core.decision.events import Decision, Event
 from damadics_fd.core.judgement import Judgement, LiveJudgement
@@ -19,7 +18,7 @@ from damadics_fd.core.modes import PHASE_INIT, PHASE_MONITOR
 from damadics_fd.core.text import SENTENCE, plain
 from damadics_fd.nodes.alarm_memory import AlarmMemory
 from damadics_fd.nodes.detector_report import report_of
-from damadics_fd.nodes.joint import Joints, Taker
+from damadics_fd.nodes.joint import Joints, News, Taker
 from damadics_fd.nodes.judged_samples import JudgedSamples
 from damadics_fd.nodes.managed import MonitoringNode
 from damadics_fd.nodes.operator import OperatorActions, OperatorServices
@@ -204,18 +203,18 @@ class DetectorNode(MonitoringNode):
         self._judged += 1
         return self._core.update(estimate)
 
-    def _judged_beside(self, stamp: int, tag: str, news: int) -> None:
+    def _judged_beside(self, stamp: int, tag: str, news: News) -> None:
         """Publish what an estimator of this process has had judged, an ordinary estimate."""
         taker = self._taker
         taker.ordinary += 1
         self._settle()
         self.last, self.unread = stamp, True
         moved = tag != self._tag
-        if news or moved or self._was_silent or self._samples.heard:
-            self._publish(tag, bool(news & SHOWN))
-            if news & HAPPENED:
+        if any(news) or moved or self._was_silent or self._samples.heard:
+            self._publish(tag, news.shown)
+            if news.happened:
                 self._happened(tag)
-        if news & SIGNED or self._signature.due(stamp):
+        if news.signed or self._signature.due(stamp):
             self._signature.update(stamp, tag)
         if moved or self._strokes.under_way:
             self._strokes.follow(self._core.estimate, tag)

@@ -13,7 +13,7 @@ from damadics_msgs.srv import Relearn
 
 from damadics_fd.core.approximator.estimator import Estimator
 from damadics_fd.core.approximator.state import Estimate
-from damadics_fd.core.bank.pair import ESTIMATED, REFUSED, Pair
+from damadics_fd.core.bank.pair import ESTIMATED, HAPPENED, REFUSED, SHOWN, SIGNED, Pair
 from damadics_fd.core.decision.alarm import (
     FAILURE,
     FUNCTION_CHECK,
@@ -26,7 +26,7 @@ from damadics_fd.core.judgement import Judgement
 from damadics_fd.core.quality import Reason, Refused
 from damadics_fd.core.sample import Sample
 from damadics_fd.nodes.frozen_position import FrozenPosition
-from damadics_fd.nodes.joint import Beside, Joints, Taker
+from damadics_fd.nodes.joint import Beside, Joints, News, Taker
 from damadics_fd.nodes.managed import MonitoringNode
 from damadics_fd.nodes.operator import OperatorActions
 from damadics_fd.nodes.reference_keeper import ReferenceKeeper
@@ -162,7 +162,8 @@ class EstimatorNode(MonitoringNode):
             if heard:
                 taker.sent(sample.stamp)
                 self._publisher.publish(self._encoder.encode(core.latest, tag))
-            taker.judged(sample.stamp, tag, news)
+            bits = (HAPPENED, SHOWN, SIGNED)
+            taker.judged(sample.stamp, tag, News(*(bool(news & bit) for bit in bits)))
             if heard:
                 taker.tell_each()
             return None

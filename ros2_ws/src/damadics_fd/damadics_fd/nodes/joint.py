@@ -9,7 +9,7 @@ Over DDS this hop costs more than everything else that a sample needs.
 import math
 from collections import deque
 from collections.abc import Callable
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from damadics_fd.core.approximator.state import Estimate
 from damadics_fd.core.decision.detector import Detector
@@ -18,6 +18,14 @@ from damadics_fd.nodes.input_watch import InputWatch
 from damadics_fd.ros.process.rounds import Rounds
 
 MOST_ECHOES = 100_000  # as many as the queue of samples holds
+
+
+class News(NamedTuple):
+    """Say what is new with a judged sample."""
+
+    happened: bool  # a transition of the alarm
+    shown: bool  # a flag shows something else
+    signed: bool  # state, family or cause of the signature is another
 
 
 class Beside(Protocol):
@@ -40,8 +48,8 @@ class Taker:
     :param take: called with each estimate and its tag.
     :param hear: called with each judgement, where the mode has any.
     :param beside: the detector, where its estimates may be judged with the samples.
-    :param judged: called after that, with stamp, tag and the bits of `Pair.take`; not for each
-        sample of which there is nothing to tell.
+    :param judged: called after that, with stamp, tag and news; not for each sample of which there
+        is nothing to tell.
     """
 
     watch: InputWatch  # of the estimator beside
@@ -51,7 +59,7 @@ class Taker:
         take: Callable[[Estimate, str], None],
         hear: Callable[[Judgement], None] = lambda judgement: None,
         beside: Beside | None = None,
-        judged: Callable[[int, str, int], None] = lambda stamp, tag, news: None,
+        judged: Callable[[int, str, News], None] = lambda stamp, tag, news: None,
     ) -> None:
         self.take, self.hear, self.beside, self.judged = take, hear, beside, judged
         self._echoes: deque[int] = deque(maxlen=MOST_ECHOES)
