@@ -19,7 +19,6 @@ from damadics_fd.core.text import SENTENCE, plain
 from damadics_fd.nodes.alarm_memory import AlarmMemory
 from damadics_fd.nodes.detector_report import report_of
 from damadics_fd.nodes.joint import Joints, News, Taker
-from damadics_fd.nodes.judged_samples import JudgedSamples
 from damadics_fd.nodes.managed import MonitoringNode
 from damadics_fd.nodes.operator import OperatorActions, OperatorServices
 from damadics_fd.nodes.partial_strokes import PartialStrokes, declared_limits
@@ -35,6 +34,7 @@ from damadics_fd.ros.conversions import (
 )
 from damadics_fd.ros.diagnostics import Level, Report
 from damadics_fd.ros.entities import ASKED_EVERY
+from damadics_fd.ros.judged_samples import JudgedSamples
 from damadics_fd.ros.raw import any_estimate, stamp_of
 from damadics_fd.ros.spin import spin
 from damadics_fd.store.alarms import default_folder
