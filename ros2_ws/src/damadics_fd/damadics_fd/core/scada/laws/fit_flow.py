@@ -122,20 +122,30 @@ def fit_flow(
     good &= x < 1.0 - 0.5 * STEP
     if good.sum() < 100:
         return None
-    lag = LAGS[0]
-    error, c, v, left, spread = _fit(t, x, model_x, size, flow, good, lag)
-    for longer in LAGS[1:]:
-        fit = _fit(t, x, model_x, size, flow, good, longer)
-        if fit[0] < BETTER * error:
-            lag, (error, c, v, left, spread) = longer, fit
+    fits = [_fit(t, x, model_x, size, flow, good, lag) for lag in LAGS]
+    shown = _lag_shown([fit[0] for fit in fits])
+    _, c, v, left, spread = fits[shown]
     law = np.zeros(1, FLOW_LAW)
-    law['medium'], law['c'], law['lag_s'], law['range'] = medium, c, lag, flow_range
+    law['medium'], law['c'], law['lag_s'], law['range'] = medium, c, LAGS[shown], flow_range
     law['size0'] = float(np.mean(size[good]))
     law['noise'] = max(METER * scale, _white(flow))
     law['spread'] = max(spread, 1e-3)
     law['v'][0, :KNOTS, :KNOTS] = v
     law['v'][0, KNOTS, KNOTS] = _exponent_doubt(left, size - law['size0'][0]) ** 2
     return FlowFit(law, left, int(good.sum()))
+
+
+def _lag_shown(errors: list[float]) -> int:
+    """
+    Return which lag the meter has: where the error is least, if it grows again beyond it.
+
+    Where longer lags fit ever better, they smooth slow swings of the plant: no lag was seen.
+
+    >>> LAGS[_lag_shown([4.0, 3.8, 3.4, 2.7, 1.6, 0.2, 1.7])], LAGS[_lag_shown([9, 8, 7, 6, 5, 4, 3.0])]
+    (8.0, 0.0)
+    """
+    least = int(np.argmin(errors))
+    return least if least < len(errors) - 1 and errors[least] < BETTER * errors[0] else 0
 
 
 def _fit(
