@@ -25,6 +25,7 @@ class Reason(IntEnum):
 
 REASONS = tuple(reason.name.lower() for reason in Reason)
 ACCEPTED, NOT_FINITE, OUT_OF_RANGE, ZERO_STAMP, DUPLICATE, OUT_OF_ORDER = map(int, Reason)
+BEYOND = 1e9  # degC or kg/s: the mark of a corrupt sample
 EXPLANATIONS = {
     'not_finite': 'a needed signal is missing, NaN or infinite',
     'out_of_range': 'a signal is outside its range: sensor failure or wrong unit',
@@ -114,8 +115,9 @@ def signal_fault(c: Settings, index: int, value: float) -> int:
     """
     Judge one signal by its place in SIGNALS.
 
-    All modes need cv and x1, mode monitor also p1, p2 and ps. What is not needed may be NaN; only
-    an infinite value, the mark of a corrupt sample, is refused there.
+    All modes need cv and x1, mode monitor also p1, p2 and ps. What is not needed may be NaN;
+    temperature and flow are refused only where they are infinite or beyond any range, the mark
+    of a corrupt sample.
 
     :param c: settings record.
     :param index: place in SIGNALS.
@@ -130,7 +132,7 @@ def signal_fault(c: Settings, index: int, value: float) -> int:
         return value_fault(value, -0.025 * c.p_max, c.p_max, drop)
     if index == 6:
         return value_fault(value, -0.025 * c.ps_max, c.ps_max, force)
-    return NOT_FINITE if math.isinf(value) else ACCEPTED
+    return value_fault(value, -BEYOND, BEYOND, False)
 
 
 @jit
@@ -156,7 +158,8 @@ def check_values(
         and -0.025 * c.p_max <= p1 <= c.p_max
         and -0.025 * c.p_max <= p2 <= c.p_max
         and -0.025 * c.ps_max <= ps <= c.ps_max
-        and math.isfinite(t1 + flow)
+        and abs(t1) <= BEYOND
+        and abs(flow) <= BEYOND
     ):
         return ACCEPTED  # nearly always; what follows costs ten times as much
     for index, value in enumerate((cv, x1, p1, p2, t1, flow, ps)):

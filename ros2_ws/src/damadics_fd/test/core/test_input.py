@@ -48,8 +48,8 @@ BAD = {
     'p1': [math.nan, 1e12],
     'p2': [math.inf, -1e6],
     'ps': [math.nan, 5e6],
-    't1': [math.inf],
-    'flow': [-math.inf],
+    't1': [math.inf, -1e10],
+    'flow': [-math.inf, 1e308],
 }
 
 

@@ -165,6 +165,20 @@ def test_a_valve_that_stands_still_is_not_learned():
         learn(rows, ScadaSettings(learn_s=400.0))
 
 
+def test_numbers_that_no_valve_has_are_not_learned_and_end_nothing():
+    rows = driven(700, 3)
+    rows[::3, F] = 1e308
+    monitor = ScadaMonitor(SETTINGS)
+    monitor.run_samples(rows)
+    assert monitor.reference is None
+    assert 'the flow is more than 1000 times its range in 33 %' in monitor.learning_problem
+    rows = driven(700, 3)
+    rows[100, F] = rows[101, F] = 1e308
+    monitor = ScadaMonitor(SETTINGS)
+    assert not monitor.run_samples(rows)['alarm'].any()
+    assert monitor.reference is not None
+
+
 @pytest.mark.parametrize(('swing', 'shift', 'kind'), [(0.1, -0.01, LAW), (0.1, 0.0, NOMINAL)])
 def test_a_quiet_stem_off_the_stated_one_is_another_valve(swing, shift, kind):
     """Of a stem that hardly moves the stated actuator leaves little, whatever the valve is."""

@@ -27,7 +27,7 @@ from damadics_fd.core.scada.laws.clean import (
     worthwhile,
 )
 from damadics_fd.core.scada.laws.fit_stem import Piece, StemFit, fit_stem
-from damadics_fd.core.scada.laws.plausible import LearningError, check_stem
+from damadics_fd.core.scada.laws.plausible import LearningError, check_stem, possible
 from damadics_fd.core.scada.laws.robust import Floats, huber_weights, loss_of
 from damadics_fd.core.scada.prediction import Prediction, predicted, residuals_of
 from damadics_fd.core.scada.samples import CV, PRESSURE_1, PRESSURE_2, T, X
@@ -76,6 +76,17 @@ def learn(
     :raises LearningError: for a record that is too short, in which the valve hardly moves or that
         does not look like a valve that works.
     """
+    try:
+        return _learned(possible(samples), settings, until, notes)
+    except np.linalg.LinAlgError as problem:
+        raise LearningError(
+            f'the record cannot be fitted ({problem}): look for values that no valve has'
+        ) from problem
+
+
+def _learned(
+    samples: Floats, settings: ScadaSettings, until: float | None, notes: list[str] | None
+) -> np.ndarray:
     t = samples[:, T] - samples[0, T]
     window = (t >= settings.learn_from_s) & (t < (settings.learn_s if until is None else until))
     gap = max(settings.gap_s, GAP_PERIODS * period_of(samples[:, T]))

@@ -141,8 +141,10 @@ def _lag_shown(errors: list[float]) -> int:
 
     Where longer lags fit ever better, they smooth slow swings of the plant: no lag was seen.
 
-    >>> LAGS[_lag_shown([4.0, 3.8, 3.4, 2.7, 1.6, 0.2, 1.7])], LAGS[_lag_shown([9, 8, 7, 6, 5, 4, 3.0])]
-    (8.0, 0.0)
+    >>> LAGS[_lag_shown([4.0, 3.8, 3.4, 2.7, 1.6, 0.2, 1.7])]
+    8.0
+    >>> LAGS[_lag_shown([9.0, 8.0, 7.0, 6.0, 5.0, 4.0, 3.0])]
+    0.0
     """
     least = int(np.argmin(errors))
     return least if least < len(errors) - 1 and errors[least] < BETTER * errors[0] else 0

@@ -18,10 +18,32 @@ OFFSET = 0.1
 SIGMAS = 4.0
 UNLIKE = 'this does not look like a valve that works'
 FLOW_GAIN = 0.1
+ABSURD = 1e3  # times its range: no signal of a valve
+STRAY = 0.01  # share of samples that may say so
+MEASURED = ('CV', 'X', 'P1', 'P2', 'T1', 'the flow')
 
 
 class LearningError(ValueError):
     """The record cannot serve as a reference; the message names cause and remedy."""
+
+
+def possible(samples: Floats) -> Floats:
+    """
+    Leave out numbers that no valve has: sums of their squares have no end.
+
+    :param samples: rows of scaled samples, time first; NaN where not measured.
+    :return: the same with NaN for them.
+    :raises LearningError: where one signal has many, naming it.
+    """
+    absurd = np.abs(samples) > ABSURD
+    absurd[:, 0] = False
+    for name, share in zip(MEASURED, absurd[:, 1:].mean(axis=0).tolist(), strict=True):
+        if share > STRAY:
+            raise LearningError(
+                f'{name} is more than {ABSURD:g} times its range in {100.0 * share:.0f} % of the '
+                'samples: values that no valve has; check units and what sends them'
+            )
+    return np.where(absurd, np.nan, samples)
 
 
 def check_stem(fit: StemFit, cv: Floats, x: Floats) -> None:
