@@ -20,7 +20,7 @@ import rclpy
 import single_messages
 import yaml
 from damadics_bringup.processes import executable
-from damadics_fd.core.bank import Bank
+from damadics_fd.core.bank.bank import Bank
 from damadics_fd.core.monitor import monitor_for
 from damadics_fd.core.sample import SIGNALS
 from damadics_fd.core.settings import Settings

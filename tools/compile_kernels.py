@@ -52,7 +52,7 @@ def pipeline() -> None:
 
 def bank(mode: str) -> None:
     """Compile the loop over rows of many valves, which is made of the same steps."""
-    from damadics_fd.core.bank import Bank
+    from damadics_fd.core.bank.bank import Bank
     from damadics_fd.core.settings import Settings
 
     row = {name: np.array([value]) for name, value in SAMPLE.items()}

@@ -9,8 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from damadics_fd.core.bank import Bank, ahead
+from damadics_fd.core.bank import ahead
 from damadics_fd.core.bank.approximators import Approximators
+from damadics_fd.core.bank.bank import Bank
 from damadics_fd.core.bank.lazily import copies
 from damadics_fd.core.decision.events import Decision
 from damadics_fd.core.monitor import monitor_for

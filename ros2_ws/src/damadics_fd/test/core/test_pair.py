@@ -3,6 +3,9 @@
 """Estimator and detector in one call a sample: the same bits as one after the other."""
 
 import math
+import os
+import subprocess
+import sys
 
 import pytest
 from damadics_fd.core.approximator.estimator import Estimator
@@ -103,3 +106,13 @@ def test_an_estimate_with_the_stamp_of_the_latest_decision_is_not_judged():
     refused = both.take(Sample(7_500_001, math.nan, 0.5), phase, 5_000_001)
     assert estimator.counters['not_finite'] == 1
     assert refused < pair.REFUSED
+
+
+def test_a_node_of_one_valve_loads_no_mode_scada():
+    """Its many modules would make each node start a tenth later."""
+    code = 'import sys, damadics_fd.core.bank.pair; print(*sys.modules)'
+    environment = {**os.environ, 'PYTHONPATH': os.pathsep.join(sys.path)}
+    told = subprocess.run(
+        [sys.executable, '-c', code], env=environment, capture_output=True, text=True, check=True
+    )
+    assert not [name for name in told.stdout.split() if '.scada' in name]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from damadics_fd.core.approximator.estimator import Estimator
 from damadics_fd.core.approximator.transmitter import delay, delay_column
-from damadics_fd.core.bank import Bank
+from damadics_fd.core.bank.bank import Bank
 from damadics_fd.core.decision.detector import Detector
 from damadics_fd.core.decision.events import Decision
 from damadics_fd.core.modes import (

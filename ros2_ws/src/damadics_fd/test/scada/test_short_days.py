@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from damadics_fd.core.bank import Bank
+from damadics_fd.core.bank.bank import Bank
 from damadics_fd.core.decision.alarm import RAISED
 from damadics_fd.core.modes import PHASE_HOLD, PHASE_MONITOR
 from damadics_fd.core.monitor import Chain

@@ -1,7 +1,7 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Monitors of many valves in arrays, one compiled loop over their samples."""
+"""
+Monitors of many valves in arrays, one compiled loop over their samples: see `bank.Bank`.
 
-from damadics_fd.core.bank.bank import Bank, Changes
-
-__all__ = ['Bank', 'Changes']
+Nothing is imported here: a node of one valve takes `pair` only, and needs no mode scada for it.
+"""

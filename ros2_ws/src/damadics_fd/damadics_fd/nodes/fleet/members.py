@@ -11,7 +11,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from damadics_fd.core.bank import Bank
+from damadics_fd.core.bank.bank import Bank
 from damadics_fd.core.decision.events import Event
 from damadics_fd.core.record import Ints, Saved
 from damadics_fd.core.result import events_in
