@@ -5,14 +5,23 @@
 import hashlib
 import os
 import shutil
+import sys
 from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-import numba
-
 from damadics_fd.core.private import instead_of, writable
+
+# numba takes in `coverage` wherever that is installed: a twentieth of a node's start, for nothing
+UNUSED = 'coverage'
+if UNUSED not in sys.modules:
+    sys.modules[UNUSED] = None  # type: ignore[assignment]
+    import numba
+
+    del sys.modules[UNUSED]
+else:
+    import numba
 
 F = TypeVar('F', bound=Callable[..., Any])
 settings: Any = numba.config
