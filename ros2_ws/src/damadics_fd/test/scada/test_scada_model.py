@@ -9,7 +9,7 @@ from damadics_fd.core.scada.model import FAULTS, STEM, advance_stem, start_stem
 from damadics_fd.core.valve.flow import density
 from damadics_fd.core.valve.parameters import Valve
 from damadics_fd.core.valve.plug import RECOVERY, recovery
-from damadics_fd.core.valve.pneumatics import characteristic
+from damadics_fd.core.valve.pneumatics import ATMOSPHERE, characteristic
 
 ACT = Valve().record()
 P1, P2 = 3.5e6, 2.6e6
@@ -109,3 +109,24 @@ def test_state_does_not_depend_on_how_the_time_is_cut():
             0.0,
         )
     assert pytest.approx(whole.X, abs=1e-12) == stem[0].X
+
+
+def test_without_play_the_air_in_the_chamber_is_conserved_through_any_motion():
+    act = Valve(stem_play=0.0).record()
+    stem, nominal = np.zeros(1, STEM), np.zeros(1, FAULTS)
+    start_stem(stem[0], act[0], 0.0)
+    cv = 0.5 + 0.25 * np.sin(np.arange(0.0, 4000.0) * 0.3)
+    for k in range(1, len(cv)):
+        advance_stem(
+            stem[0], act[0], nominal[0], k - 1.0, k, cv[k - 1], cv[k], DROP, DROP, 0.0, 0.0
+        )
+    volume = act[0].open_volume + act[0].area * stem[0].X
+    at_rest = ATMOSPHERE * act[0].chamber_volume / start_mass(act)
+    assert stem[0].p * volume / stem[0].m_a == pytest.approx(at_rest, rel=1e-4)
+
+
+def start_mass(act):
+    """Return the air in the chamber of a valve at rest."""
+    stem = np.zeros(1, STEM)
+    start_stem(stem[0], act[0], 0.0)
+    return stem[0].m_a

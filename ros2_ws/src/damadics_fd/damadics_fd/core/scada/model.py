@@ -23,7 +23,7 @@ from damadics_fd.core.valve.pneumatics import (
     transducer,
 )
 
-SUB_STEPS = 7  # of 5 ms; a day's drift against the plant is then 1e-4 of stroke
+SUB_STEPS = 7  # of 5 ms
 COARSE_SUB_STEPS = 7  # enough for minutes
 GAS = GAS_CONSTANT * AIR_TEMPERATURE
 MINIMUM_SUPPLY = 1.2e5
@@ -180,7 +180,6 @@ def advance_stem(
         e = min(max(transducer(y2, pv, gain) * (1.0 - fault.f12), -1.0), 1.0)
         for _ in range(sub_steps):
             gauge = p - ATMOSPHERE
-            volume = act.open_volume + area * X
             md = air_flow(e, supply, gauge, act.air_flow)
             if leak > 0.0:
                 md -= leak * math.copysign(math.sqrt(abs(gauge)), gauge)
@@ -190,6 +189,7 @@ def advance_stem(
                 force = 0.0
             step = mobility * force
             x = min(max(x + step, -0.05 * stroke), 1.25 * stroke)
+            before = X
             half = 0.5 * play0
             if fault.f8 != 0.0:
                 half *= 1.0 + 0.5 * fault.f8 * (1.0 - X * per_stroke)
@@ -198,9 +198,11 @@ def advance_stem(
             elif step < 0.0:
                 X = min(X, x + half)
             X = min(max(X, 0.0), top)
-            travel = min(max(step, -0.02 * h), 0.02 * h)
+            # the middle volume over the step: else p V / m_a drifts with every step of the stem
+            volume = act.open_volume + 0.5 * area * (before + X)
+            half_swept = 0.5 * area * min(max(step, -0.02 * h), 0.02 * h)
             inflow = h * md
-            p += p * (inflow / m_a - area * travel / volume)
+            p *= (m_a + inflow) * (volume - half_swept) / (m_a * (volume + half_swept))
             p = min(max(p, 0.0), 7.0e5)
             m_a = min(max(m_a + inflow, 1e-9), 0.1)
         y1_next = u - (u - y1) * lag
