@@ -9,6 +9,7 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 import yaml
+from damadics_fd.store.yaml_text import read_yaml
 
 LARGEST = 20_000_000  # bytes of a configuration: thousands of valves
 Value = str | float | bool | None
@@ -241,15 +242,15 @@ def read_config(path: Path) -> Section:
     try:
         if path.stat().st_size > LARGEST:
             raise ConfigError(f'{path}: larger than {LARGEST} bytes: this is no configuration')
-        content = yaml.safe_load(path.read_text('utf-8-sig'))
+        content = read_yaml(path.read_text('utf-8-sig'))
     except OSError as problem:
         raise ConfigError(f'{path}: {problem.strerror}') from problem
     except UnicodeDecodeError as problem:
         raise ConfigError(f'{path}: not a text file') from problem
-    except (yaml.YAMLError, RecursionError) as problem:
+    except yaml.YAMLError as problem:
         mark = getattr(problem, 'problem_mark', None)
         line = f', line {mark.line + 1}' if mark else ''
-        what = getattr(problem, 'problem', None) or 'nested too deeply'
+        what = getattr(problem, 'problem', None) or getattr(problem, 'reason', '')
         raise ConfigError(f'{path}{line}: not valid YAML: {what}') from problem
     return Section(content or {}, '', [], path.resolve().parent)
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from damadics_fd.core.text import NAME, plain
 from damadics_fd.ros import qos
-from damadics_fd.ros.conversions import judged_stamp
+from damadics_fd.ros.freshness import judged_stamp
 from damadics_msgs.msg import FaultEvent, FaultFlag, FleetEvent, FleetLayout, FleetStatus
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node

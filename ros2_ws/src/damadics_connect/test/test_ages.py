@@ -7,7 +7,7 @@ import pytest
 pytest.importorskip('rclpy')
 from damadics_connect.ages import Ages
 from damadics_connect.judgement import Judgement
-from damadics_fd.ros.conversions import judged_stamp
+from damadics_fd.ros.freshness import judged_stamp
 from damadics_msgs.msg import FaultFlag
 
 SECOND = 10**9

@@ -17,6 +17,7 @@ from damadics_fd.core.decision.events import Event
 from damadics_fd.core.record import Plain, Saved
 from damadics_fd.core.signature.state import CAUSES
 from damadics_fd.store.trends import QUANTITIES
+from damadics_fd.store.yaml_text import read_yaml
 
 NE107_NAMES = ('normal', 'maintenance', 'out_of_specification', 'function_check', 'failure')
 FIELDS = ('tag', 'value', 'less', 'factor', 'bar', 'margin', 'confidence', 'second')
@@ -147,8 +148,7 @@ class CauseTable:
 def _own(name: str) -> Plain:
     """Return the content of a table of the package; read once, since YAML is slow."""
     text = resources.files('damadics_fd').joinpath(name).read_text('utf-8')
-    content: Plain = yaml.safe_load(text)
-    return content
+    return read_yaml(text)
 
 
 def load_causes(path: Path | None = None, language: str = 'en') -> CauseTable:
@@ -171,7 +171,7 @@ def load_causes(path: Path | None = None, language: str = 'en') -> CauseTable:
         causes |= {key: replace(cause, language=language) for key, cause in translated.items()}
     if path is not None:
         try:
-            content = yaml.safe_load(Path(path).read_text('utf-8'))
+            content = read_yaml(Path(path).read_text('utf-8'))
         except yaml.YAMLError as error:
             raise CauseTableError(str(path), [f'not valid YAML: {error}']) from error
         own_causes, own_limits = _parse(content, str(path), causes)

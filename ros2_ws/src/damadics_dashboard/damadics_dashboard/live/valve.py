@@ -9,8 +9,7 @@ from typing import NamedTuple
 
 from damadics_fd.core.stamps import SECOND as NANO
 from damadics_fd.core.text import NAME, plain
-from damadics_fd.ros.conversions import judged_stamp
-from damadics_fd.ros.freshness import Freshness, default_max_age
+from damadics_fd.ros.freshness import Freshness, default_max_age, judged_stamp
 from damadics_msgs.msg import FaultEvent, FaultFlag, Isolation, Signature
 
 from damadics_dashboard.live.raw import Batch

@@ -14,7 +14,7 @@ from damadics_fd.core.decision.alarm import CHANGED, RAISED
 from damadics_fd.core.decision.events import Decision, Event
 from damadics_fd.core.judgement import Judgement
 from damadics_fd.core.sample import Sample
-from damadics_fd.core.stamps import SECOND, is_date
+from damadics_fd.core.stamps import SECOND
 from damadics_fd.core.text import NAME, SENTENCE, plain
 
 SCALARS = tuple(
@@ -103,20 +103,6 @@ def write_flag(decision: Decision, message: FaultFlag) -> None:
     message.fault, message.state = decision.fault, decision.state
     message.level, message.occurrence = decision.level, decision.occurrence
     message.residual, message.threshold = decision.residual, decision.threshold
-
-
-def judged_stamp(flag: FaultFlag) -> int | None:
-    """
-    Return the stamp that the age of a judgement may be counted from.
-
-    Before the first sample a detector's flags are stamped 0, or as the alarm of before a restart.
-
-    :param flag: the message.
-    :return: [ns]; None where the flag rests on no sample, or nobody knows when it was taken.
-    """
-    stamp = nanoseconds(flag.header.stamp)
-    judges = flag.state != FaultFlag.STATE_NOT_MONITORING
-    return stamp if is_date(stamp) or (judges and stamp > 0) else None
 
 
 def event_message(event: Event, frame_id: str) -> FaultEvent:

@@ -5,6 +5,8 @@
 import math
 from typing import Generic, TypeVar
 
+from damadics_msgs.msg import FaultFlag
+
 from damadics_fd.core.stamps import DATE, SECOND, is_date
 
 LEAST_MAX_AGE = 2.0  # s
@@ -29,6 +31,20 @@ def default_max_age(period: float) -> float:
     :return: the age [s].
     """
     return max(LEAST_MAX_AGE, PERIODS * period)
+
+
+def judged_stamp(flag: FaultFlag) -> int | None:
+    """
+    Return the stamp that the age of a judgement may be counted from.
+
+    Before the first sample a detector's flags are stamped 0, or as the alarm of before a restart.
+
+    :param flag: the message.
+    :return: [ns]; None where the flag rests on no sample, or nobody knows when it was taken.
+    """
+    stamp = flag.header.stamp.sec * SECOND + flag.header.stamp.nanosec
+    judges = flag.state != FaultFlag.STATE_NOT_MONITORING
+    return stamp if is_date(stamp) or (judges and stamp > 0) else None
 
 
 class Freshness:

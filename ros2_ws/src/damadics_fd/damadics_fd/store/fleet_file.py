@@ -10,6 +10,7 @@ from pathlib import Path
 import yaml
 
 from damadics_fd.core.record import Plain, Saved
+from damadics_fd.store.yaml_text import read_yaml
 
 NAME = re.compile(r'[a-z][a-z0-9_]*(/[a-z][a-z0-9_]*)*')
 TOPICS = (
@@ -33,22 +34,6 @@ OF_NODE = {'reference': 'estimator', 'alarm_folder': 'detector'}  # the rest is 
 
 class FleetError(ValueError):
     """The list of valves is wrong; the message has a line for every mistake."""
-
-
-class _Loader(getattr(yaml, 'CSafeLoader', yaml.SafeLoader)):  # type: ignore[misc]
-    """Read thousands of valves in a second; refuse a name that stands twice, which YAML drops."""
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> Saved:
-        names: set[str] = set()
-        for key, _ in node.value:
-            name = str(key.value)
-            if name in names:
-                raise yaml.constructor.ConstructorError(
-                    None, None, f'{name} stands twice in one mapping', key.start_mark
-                )
-            names.add(name)
-        found: Saved = super().construct_mapping(node, deep)
-        return found
 
 
 @dataclass(frozen=True)
@@ -89,10 +74,11 @@ def read_fleet(path: Path | str) -> list[Valve]:
     """
     path = Path(path)
     try:
-        text = path.read_text()
-        content = yaml.load(text, Loader=_Loader)
+        content = read_yaml(path.read_text('utf-8-sig'))
     except OSError as problem:
         raise FleetError(f'{path}: {problem.strerror}') from problem
+    except UnicodeDecodeError as problem:
+        raise FleetError(f'{path}: not a text file in UTF-8') from problem
     except yaml.YAMLError as problem:
         raise FleetError(f'{path}: {problem}') from problem
     entries = content.get('valves') if isinstance(content, dict) else None

@@ -118,3 +118,29 @@ def test_a_node_of_one_valve_loads_neither_mode_scada_nor_tools():
     loaded = told.stdout.split()
     assert 'numba' in loaded
     assert not [name for name in loaded if '.scada' in name or name == 'coverage']
+
+
+def test_a_node_that_judges_loads_nothing_that_no_kernel_calls(tmp_path):
+    """numba takes in scipy and cffi with the first compiled call, wherever they are installed."""
+    (tmp_path / 'judging.py').write_text(
+        'import sys\n'
+        'from damadics_fd.core.bank.pair import Pair\n'
+        'from damadics_fd.core.decision.detector import Detector\n'
+        'from damadics_fd.core.approximator.estimator import Estimator\n'
+        'from damadics_fd.core.sample import Sample\n'
+        'from damadics_fd.core.settings import Settings\n'
+        'def main():\n'
+        "    settings = Settings.for_mode('paper')\n"
+        '    both = Pair(Estimator(settings), Detector(settings))\n'
+        '    both.take(Sample(1, 0.5, 0.5), 0, 0)\n'
+        '    print(*(name for name, module in sys.modules.items() if module))\n'
+        '    return 0\n'
+    )
+    code = "import sys; from damadics_fd.start import run_node; sys.exit(run_node('judging'))"
+    environment = {**os.environ, 'PYTHONPATH': os.pathsep.join([str(tmp_path), *sys.path])}
+    told = subprocess.run(
+        [sys.executable, '-c', code], env=environment, capture_output=True, text=True, check=True
+    )
+    loaded = {name.partition('.')[0] for name in told.stdout.split()}
+    assert {'numba', 'damadics_fd'} <= loaded
+    assert not loaded & {'scipy', 'cffi', 'coverage'}

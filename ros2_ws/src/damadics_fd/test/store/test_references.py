@@ -15,7 +15,7 @@ from damadics_fd.bag import rosbag2
 from damadics_fd.core.approximator.estimator import Estimator
 from damadics_fd.core.monitor import run
 from damadics_fd.core.settings import Settings
-from damadics_fd.store import fleet_file
+from damadics_fd.store import yaml_text
 from damadics_fd.store.references import (
     FORMAT,
     NoReferenceError,
@@ -180,5 +180,5 @@ def test_nothing_is_ever_unpickled():  # FS-6
     sources = list(Path(damadics_fd.__file__).parent.rglob('*.py'))
     assert len(sources) > 20
     assert rosbag2._LOADER in (yaml.BaseLoader, yaml.CBaseLoader)
-    assert issubclass(fleet_file._Loader, (yaml.SafeLoader, yaml.CSafeLoader))
+    assert issubclass(yaml_text._Loader, (yaml.SafeLoader, yaml.CSafeLoader))
     assert [p.name for p in sources if unsafe.search(p.read_text('utf-8'))] == []
