@@ -48,6 +48,14 @@ def test_from_the_end_leaves_out_what_is_there_but_no_half_line(tmp_path):
     assert [row['x'] for row in table.rows()] == ['3', '4']
 
 
+def test_two_columns_of_one_name_are_nobodys(tmp_path):
+    (tmp_path / 'a.csv').write_text('t,x,y,x\n1,10,20,30\n')
+    twice = pa.table([pa.array([n]) for n in (2, 10, 20, 30)], names=['t', 'x', 'y', 'x'])
+    parquet.write_table(twice, tmp_path / 'b.parquet')
+    rows = list(Folder(tmp_path, from_end=False).rows())
+    assert rows == [{'t': '1', 'y': '20'}, {'t': '2', 'y': '20'}]
+
+
 def test_a_folder_of_csv_and_parquet(tmp_path):
     parquet.write_table(pa.table({'t': [1.0, 2.0], 'x': [0.5, None]}), tmp_path / 'a.parquet')
     (tmp_path / 'b.csv').write_text('t,x\n3,0.7\n')

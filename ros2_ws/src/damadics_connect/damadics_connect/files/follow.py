@@ -5,7 +5,8 @@
 import csv
 import io
 import os
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import BinaryIO
 
@@ -37,13 +38,15 @@ class GrowingCsv:
         self._identity = (0, 0)
         self._rest = b''
         self._names: list[str] = []
+        self._single: set[str] = set()
         self._delimiter = ','
 
     def rows(self) -> Iterator[Row]:
         """
         Return the rows that are new.
 
-        :return: column by name; a cell that is missing is ''.
+        :return: column by name; a cell that is missing is ''. Columns of one name are left out:
+            nobody knows which is meant.
         :raises FollowError: where it cannot be read, or is no table.
         """
         while True:
@@ -113,6 +116,7 @@ class GrowingCsv:
         if not self._names:
             self._delimiter = max(DELIMITERS, key=text.count)
             self._names = [name.strip() for name in self._cells(text)]
+            self._single = _single(self._names)
             if len(self._names) < 2:
                 self._names = []
                 raise FollowError(f'{self.path.name}: its first line names no columns')
@@ -121,7 +125,11 @@ class GrowingCsv:
         if cells == self._names:
             return None  # a program that was restarted has written the header again
         cells += [''] * (len(self._names) - len(cells))
-        return dict(zip(self._names, cells, strict=False))
+        return {
+            name: cell
+            for name, cell in zip(self._names, cells, strict=False)
+            if name in self._single
+        }
 
     def _cells(self, text: str) -> list[str]:
         try:
@@ -166,13 +174,19 @@ class Folder:
         except ModuleNotFoundError as problem:
             raise FollowError('Parquet needs pyarrow: pip install pyarrow') from problem
         try:
-            table = parquet.read_table(path)
+            with parquet.ParquetFile(path) as file:
+                table = file.read()
         except (ArrowException, OSError):
             return  # not whole yet: its end is written last
         self._done.add(path)
-        columns = {name: table[name].to_pylist() for name in table.column_names}
+        columns = {name: table[name].to_pylist() for name in sorted(_single(table.column_names))}
         for n in range(table.num_rows):
             yield {name: _text(column[n]) for name, column in columns.items()}
+
+
+def _single(names: Sequence[str]) -> set[str]:
+    """Return the names that one column has."""
+    return {name for name, count in Counter(names).items() if count == 1}
 
 
 def _text(value: object) -> str:

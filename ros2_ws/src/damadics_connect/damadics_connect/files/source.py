@@ -169,7 +169,7 @@ class Files:
                 key = SIGNALS[signal.slot]
                 value = math.nan
                 if signal.source not in row:
-                    joiner.tally.bad[key] = f'no column {signal.source[:40]}'
+                    joiner.tally.bad[key] = f'no column {signal.source[:40]}, or two of it'
                 elif (text := row[signal.source]) and (number := number_of(text)) is None:
                     joiner.tally.bad[key] = f'{text[:20]!r} is no number'
                 else:

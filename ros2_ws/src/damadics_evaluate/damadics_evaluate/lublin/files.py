@@ -3,14 +3,15 @@
 """Read daily files of the plant: 33 columns without a header, or a CSV with the plant's tags."""
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from datetime import date
 from pathlib import Path
 
 import numpy as np
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.mapping import Scale
-from damadics_fd.bag.tables.headers import LUBLIN, TAGS, Assignment, Use, tag_matches
+from damadics_fd.bag.tables.assignment import TAGS, Assignment, doubtful, tagged, the_only
+from damadics_fd.bag.tables.headers import LUBLIN, Header
 from damadics_fd.bag.tables.sniff import BLANKS, Layout
 from damadics_fd.bag.tables.table import TextTable
 
@@ -88,7 +89,7 @@ def read_file(file: Path, on_problem: Callable[[str], None]) -> dict[int, Column
     :param file: 33 columns without a header, or a header with the tags in any case.
     :param on_problem: told of lines that are left out.
     :return: columns by actuator, empty where it is no table of the plant.
-    :raises BagError: where it cannot be read.
+    :raises BagError: where it cannot be read, or several columns may be one signal.
     """
     try:
         with file.open(encoding='utf-8', errors='replace') as stream:
@@ -103,31 +104,25 @@ def read_file(file: Path, on_problem: Callable[[str], None]) -> dict[int, Column
         if len(names) != len(LUBLIN):
             return {}
         names, header = [name.lower() for name in LUBLIN], 0
+    titles = [Header(name, name) for name in names]
+    times = [i for i, name in enumerate(names) if name in TIMES]
     found = {}
     for actuator in ACTUATORS:
-        use = _use(names, TAGS[actuator])
-        if {'stamp', 'cv', 'x1'} <= use.keys():
-            time, _ = use.pop('stamp')
-            signals = {name: Use(column, scale) for name, (column, scale) in use.items()}
+        columns = tagged(titles, range(len(names)), TAGS[actuator])
+        if times and {'cv', 'x1'} <= columns.keys():
+            try:
+                if len(times) > 1:
+                    raise doubtful('t', times, titles, with_map=False)
+                signals = the_only(columns, titles, with_map=False)
+            except BagError as error:
+                raise BagError(error.reason, file) from error
             layout = Layout('utf-8', delimiter or BLANKS, (), (), header, ())
-            where = Assignment(signals, (time,), Scale())
+            where = Assignment(signals, (times[0],), Scale())
             table = TextTable(file, f'A{actuator}', where, layout)
             chunks = list(table.chunks(on_problem))
             if chunks:
                 found[actuator] = _joined(chunks)
     return found
-
-
-def _use(names: list[str], tags: Mapping[str, tuple[str, Scale]]) -> dict[str, tuple[int, Scale]]:
-    """Return which column of a file is which signal, with its scale to SI."""
-    use = {}
-    for i, name in enumerate(names):
-        if name in TIMES:
-            use['stamp'] = i, Scale()
-        for tag, (signal, scale) in tags.items():
-            if tag_matches(tag, name):
-                use.setdefault(signal, (i, scale))
-    return use
 
 
 def _joined(parts: list[Columns]) -> Columns:

@@ -196,7 +196,7 @@ def parse_maps(texts: Sequence[str]) -> Maps:
 
     :param texts: each `SIGNAL=SOURCE`, as `parse_source` reads it.
     :return: the source of each signal.
-    :raises BagError: where a text is none of these.
+    :raises BagError: where a text is none of these, or two are of one signal or one source.
 
     >>> parse_maps(['cv=/valve/setpoint.data*0.01'])['cv'].scale.factor
     0.01
@@ -208,7 +208,15 @@ def parse_maps(texts: Sequence[str]) -> Maps:
         if not equals or not source.strip() or signal not in (*SIGNALS, *TIMES):
             raise BagError(f'--map {text}: {_REMEDY}')
         try:
-            maps[signal] = parse_source(signal, source)
+            parsed = parse_source(signal, source)
         except BagError as error:
             raise BagError(f'--map {error.reason}') from None
+        for other, known in maps.items():
+            if signal == other or {signal, other} == {*TIMES}:
+                raise BagError(f'--map {text}: {other} has a source, {known.name!r}: give one')
+            if known.name == parsed.name:
+                raise BagError(
+                    f'--map {text}: {other} is {known.name!r}, too: each has a source of its own'
+                )
+        maps[signal] = parsed
     return maps

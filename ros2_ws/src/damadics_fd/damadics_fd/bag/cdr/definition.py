@@ -97,7 +97,9 @@ def parse_definition(name: str, text: str) -> Definition:
         raise BagError(f'the schema of {name} defines more than {_MOST_TYPES} types')
     definition = {full_name(name): _members(sections[0], name.split('/')[0])}
     for kind, body in zip(sections[1::2], sections[2::2], strict=True):
-        definition.setdefault(full_name(kind), _members(body, kind.split('/')[0]))
+        members = _members(body, kind.split('/')[0])
+        if definition.setdefault(full_name(kind), members) != members:
+            raise BagError(f'the schema of {name} defines {kind} twice, and differently')
     return checked(name, definition)
 
 
@@ -105,14 +107,16 @@ def checked(name: str, definition: Definition) -> Definition:
     """
     Return the definition of a message.
 
-    :raises BagError: where it is too large or lacks a type.
+    :raises BagError: where it is too large, lacks a type or has two fields of one name.
     """
     if sum(map(len, definition.values())) > _MOST_MEMBERS:
         raise BagError(f'the schema of {name} has more than {_MOST_MEMBERS} fields')
-    for members in definition.values():
+    for kind, members in definition.items():
+        if len({member.name for member in members}) < len(members):
+            raise BagError(f'the schema of {name} has two fields of one name in {kind}')
         for member in members:
-            kind = member.type
-            if not (kind in PRIMITIVES or kind in STRINGS or kind in definition):
+            known = member.type in PRIMITIVES or member.type in STRINGS
+            if not (known or member.type in definition):
                 raise BagError(f'the schema of {name} does not define {member.type}')
     return definition
 

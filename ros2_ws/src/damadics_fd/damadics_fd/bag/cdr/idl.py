@@ -93,9 +93,11 @@ class _Parser:
 
     def _struct(self, name: str) -> None:
         self._next('{')
-        members = self.types[name] = []
+        members = []
         while not self._take('}'):
             members.append(Member(*self._member()))
+        if self.types.setdefault(name, members) != members:
+            raise BagError(f'the IDL definition has {name[:40]} twice, and differently')
 
     def _member(self) -> tuple[str, str, int | None]:
         """Read type, name and length of an array up to the semicolon."""

@@ -11,7 +11,7 @@ import numpy as np
 from damadics_fd.bag.arrays import Column, Columns, Places
 from damadics_fd.bag.columns import read_columns
 from damadics_fd.bag.errors import BagError
-from damadics_fd.bag.mapping import Source
+from damadics_fd.bag.mapping import TIMES, Source
 
 _ELEMENT = re.compile(r'\[(\d+)\]$')  # of an array
 Told = Callable[[str], None]
@@ -29,6 +29,10 @@ def mapped(path: Path, maps: Mapping[str, Source], on_problem: Told) -> Columns:
     """
     parsed: dict[str, tuple[str, str, int | None]] = {}
     for signal, source in maps.items():
+        if signal in TIMES:
+            raise BagError(
+                f'--map {signal}={source.name}: in a bag the time is that of the messages', path
+            )
         topic, dot, name = source.name.partition('.')
         if not dot:
             raise BagError(f'--map {signal}={source.name}: write /topic.field', path)
@@ -38,6 +42,13 @@ def mapped(path: Path, maps: Mapping[str, Source], on_problem: Told) -> Columns:
             _ELEMENT.sub('', name),
             int(index[1]) if index else None,
         )
+        for other in [*parsed][:-1]:
+            if _place(parsed[other]) == _place(parsed[signal]):
+                raise BagError(
+                    f'--map: {other} and {signal} are both {source.name}: each has a field of'
+                    ' its own',
+                    path,
+                )
     if not {'cv', 'x1'} <= parsed.keys():
         raise BagError('--map must name at least cv and x1', path)
     read = {
@@ -72,6 +83,11 @@ def mapped(path: Path, maps: Mapping[str, Source], on_problem: Told) -> Columns:
             path,
         )
     return {name: column[known] for name, column in columns.items()}
+
+
+def _place(source: tuple[str, str, int | None]) -> tuple[str, str, int | None]:
+    """Return a source without what may be left out: the slash before a topic."""
+    return (source[0].lstrip('/'), *source[1:])
 
 
 def _clock(read: Mapping[str, Columns], path: Path) -> str:

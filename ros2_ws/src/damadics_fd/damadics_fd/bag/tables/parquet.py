@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from damadics_fd.bag.arrays import Columns
 from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.mapping import Scale, Source
-from damadics_fd.bag.tables.headers import NANOSECONDS, SECOND, Assignment, assign, headers
+from damadics_fd.bag.tables.assignment import NANOSECONDS, SECOND, Assignment, assign
+from damadics_fd.bag.tables.headers import headers
 from damadics_fd.bag.tables.table import ROWS, Table, Told, lacking
 from damadics_fd.bag.tables.times import Dates, seconds_of
 
@@ -68,8 +69,8 @@ class ParquetTable(Table):
 
     def _pieces(self, valves: Sequence[str] | None, on_problem: Told) -> Iterator[Columns]:
         signals = self.assignment.signals
-        clock = [self.names[column] for column in self.assignment.time]
-        wanted = {*clock, *(self.names[use.column] for use in signals.values())}
+        used = {*self.assignment.time, *(use.column for use in signals.values())}
+        wanted = {self.names[column] for column in used}
         wanted |= {VALVE} if valves is not None else set()
         row = 0
         try:
@@ -82,8 +83,8 @@ class ParquetTable(Table):
                         if not len(batch):
                             continue
                     for name, use in signals.items():
-                        columns[name] = use.scale(_numbers(batch.column(self.names[use.column])))
-                    time = _time([batch.column(name) for name in clock])
+                        columns[name] = use.scale(_numbers(self._column(batch, use.column)))
+                    time = _time([self._column(batch, i) for i in self.assignment.time])
                     exact = _exact(time, self.assignment.scale == NANOSECONDS)
                     if exact is not None:
                         yield columns | {'stamp': exact}
@@ -94,6 +95,12 @@ class ParquetTable(Table):
                         yield kept
         except (pyarrow.ArrowException, OSError, ValueError) as error:
             raise BagError(f'cannot be read: {error}', self.path) from error
+
+    def _column(self, batch: 'pyarrow.RecordBatch', column: int) -> 'pyarrow.Array':
+        """Return a column by its place in the file: several may have one name."""
+        name = self.names[column]
+        there = [i for i, other in enumerate(batch.schema.names) if other == name]
+        return batch.column(there[self.names[:column].count(name)])
 
     def _stamps(self, time: 'pyarrow.Array') -> NDArray[np.float64]:
         """Return times [ns] that are numbers or text, NaN where there is none."""

@@ -126,7 +126,7 @@ def sniff(path: Path) -> Layout:
     rows = tuple(tuple(cells) for cells in table[first:] if _is_data(cells, width))
     if any('%' in cell for cells in rows for cell in cells):
         units = tuple(_unit(i, units, rows) for i in range(width))
-    stripped = tuple(name.strip().lstrip('#').strip() for name in names)
+    stripped = tuple(name.strip().lstrip('' if i else '#').strip() for i, name in enumerate(names))
     return Layout(encoding, delimiter, stripped, units, first, rows)
 
 

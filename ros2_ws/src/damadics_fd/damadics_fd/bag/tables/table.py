@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from damadics_fd.bag.arrays import Column, Columns
 from damadics_fd.bag.errors import BagError, NoMeasurementError
 from damadics_fd.bag.mapping import Scale, Source
-from damadics_fd.bag.tables.headers import LUBLIN, SECOND, Assignment, assign, headers
+from damadics_fd.bag.tables.assignment import SECOND, Assignment, assign
+from damadics_fd.bag.tables.headers import LUBLIN, headers
 from damadics_fd.bag.tables.sniff import BLANKS, Layout, parse_cell, sniff, split
 from damadics_fd.bag.tables.times import Dates, is_date, seconds_of
 
