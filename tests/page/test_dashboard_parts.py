@@ -3,7 +3,6 @@
 """The page without a browser: traces, honest decimation, words, access, history."""
 
 import re
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +12,6 @@ from damadics_dashboard.live.raw import Batch
 from damadics_dashboard.live.record import ACTIONS
 from damadics_dashboard.live.traces import NANO, Trace, envelope
 from damadics_dashboard.live.valve import Valve
-from damadics_dashboard.pages import fleet_page
 from damadics_dashboard.pages.fleet_page import tile
 from damadics_dashboard.pages.playback import settings_in_file
 from damadics_dashboard.store.export import cell
@@ -298,28 +296,3 @@ def test_durations_and_times_have_one_form():
         '3 days',
     ]  # fmt: skip
     assert re.fullmatch(r'2023-11-1\d \d\d:\d\d:\d\d UTC([+-]\d\d:\d\d)?', t.moment(17 * 10**17))
-
-
-@pytest.mark.parametrize('count', [50, 200])
-def test_residuals_of_a_large_fleet_are_told_in_turns_and_alarms_at_once(monkeypatch, count):
-    residual, kinds = iter(range(10**6)), {}
-
-    def drawn(valve, *_):
-        restless = next(residual)
-        kind = kinds.get(valve.name, 'ok')
-        return {'kind': kind, 'ratio': str(restless), 'share': restless, 'why': ''}
-
-    monkeypatch.setattr(fleet_page, 'tile', drawn)
-    names = [f'v{n:03d}' for n in range(count)]
-    valves = {name: Valve(name) for name in names}
-    tiles = fleet_page.Tiles(SimpleNamespace(valves=valves, clock=0), texts('en'))
-    assert set(tiles.news()['tiles']) == set(names)
-    turns = [tiles.news()['tiles'] for _ in range(fleet_page.TURNS)]
-    assert set().union(*turns) == set(names)
-    most = max(map(len, turns))
-    assert most == (count if count <= fleet_page.LARGE else count / fleet_page.TURNS)
-    for kind in ('F', 'ok'):
-        kinds['v007'] = kind
-        told = tiles.news()['tiles']
-        assert told['v007']['kind'] == kind
-        assert told['v007']['ratio'] not in {turn.get('v007', {}).get('ratio') for turn in turns}

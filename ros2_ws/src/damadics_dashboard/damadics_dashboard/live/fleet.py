@@ -5,9 +5,10 @@
 import math
 from collections.abc import Callable
 
+import numpy as np
 from damadics_fd.core.stamps import SECOND as NANO
 from damadics_fd.core.text import NAME, plain
-from damadics_msgs.msg import FaultFlag, FleetEvent, FleetLayout, FleetStatus
+from damadics_msgs.msg import FleetEvent, FleetLayout, FleetStatus
 from damadics_msgs.srv import (
     FleetAcknowledge,
     FleetReference,
@@ -17,10 +18,12 @@ from damadics_msgs.srv import (
 )
 
 from damadics_dashboard.live.calls import Field, Service
+from damadics_dashboard.live.judged import Judged
 from damadics_dashboard.live.valve import Membership, Valve
 
 Meet = Callable[[str], Valve]
 MOST_LAYOUTS = 100  # that are told apart: anybody may send one
+OLDEST = 4e9  # s; a greater age counts as this one: anybody may send one
 SERVICES: dict[str, tuple[str, Service, dict[str, Field]]] = {  # of one valve: those of a fleet
     'acknowledge': ('acknowledge', FleetAcknowledge, {}),
     'reset': ('reset', FleetReset, {}),
@@ -84,28 +87,35 @@ class FleetReport:
         if valves is None:
             return
         made = message.header.stamp.sec * NANO + message.header.stamp.nanosec
+        age = np.asarray(message.age)
+        known = np.isfinite(age)
+        old = np.where(known, np.clip(age, -OLDEST, OLDEST), 0.0)
+        judged = made - (NANO * old).astype(np.int64)
         columns = (
-            message.valve, message.state, message.level, message.fault, message.residual,
-            message.threshold, message.ratio, message.age, message.progress, message.since,
-        )  # fmt: skip
-        for n, state, level, fault, residual, threshold, ratio, age, progress, since in zip(
+            message.valve.tolist(),
+            message.state.tolist(),
+            message.level.tolist(),
+            message.fault,
+            message.residual.tolist(),
+            message.threshold.tolist(),
+            np.maximum(judged, 0).tolist(),
+            np.maximum(np.asarray(message.since), 0).tolist(),
+            message.ratio.tolist(),
+            message.progress.tolist(),
+        )
+        count = len(valves)
+        for n, state, level, fault, residual, limit, stamp, since, ratio, progress in zip(
             *columns, strict=False
         ):
-            if n >= len(valves):
+            if n >= count:
                 continue
-            flag = FaultFlag(state=int(state), level=int(level), fault=bool(fault))
-            flag.residual, flag.threshold = float(residual), float(threshold)
-            judged = made - int(age * NANO) if math.isfinite(age) else made
-            for field, stamp in ((flag.header.stamp, judged), (flag.since, int(since))):
-                field.sec, field.nanosec = divmod(max(stamp, 0), NANO)
-            valve = valves[int(n)]
-            flag.onset = flag.since
-            flag.header.frame_id = valve.tag
-            flag.occurrence = valve.occurrence
-            valve.learned = float(progress)
-            valve.take_flag(flag, now)
-            if math.isfinite(ratio):
-                valve.peak = max(valve.peak, float(ratio))
+            valve = valves[n]
+            valve.learned = progress
+            valve.take(
+                Judged(state, level, fault, residual, limit, stamp, since, valve.occurrence), now
+            )
+            if valve.peak < ratio < math.inf:
+                valve.peak = ratio
 
     def take_event(self, message: FleetEvent, note: Callable[[str, object], None]) -> None:
         """

@@ -9,6 +9,27 @@ from damadics_fd.bag.cdr.definition import Definition, parse_definition, schema_
 from damadics_fd.bag.cdr.layout import Layout, layout_of
 from damadics_fd.core.stamps import SECOND as NANO
 
+TOPICS: tuple[tuple[str, str, dict[str, str]], ...] = (  # with type, and columns
+    (
+        'measurement',
+        'Measurement',
+        {name: name for name in ('cv', 'x1', 'p1', 'p2', 'flow', 't1', 'ps')},
+    ),
+    (
+        'estimate',
+        'Estimate',
+        {
+            'x2': 'x2',
+            'residual': 'xi2',
+            'u': 'u',
+            'x': 'x1',
+            'progress': 'progress',
+            'phase': 'phase',
+        },
+    ),
+    ('threshold', 'Float64Stamped', {'rho': 'data'}),
+)
+
 
 @cache
 def _definition(kind: str) -> Definition:
@@ -68,3 +89,12 @@ class Batch:
         for name, path in self._columns.items():
             rows[name] = source[path]
         return rows
+
+
+def batches() -> dict[str, Batch]:
+    """
+    Return what takes the samples of one valve.
+
+    :return: batches by topic.
+    """
+    return {name: Batch(f'damadics_msgs/msg/{kind}', columns) for name, kind, columns in TOPICS}

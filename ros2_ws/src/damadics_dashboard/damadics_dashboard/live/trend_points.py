@@ -67,6 +67,8 @@ class TrendPoints:
         if signature is not None and signature is not mine.signature:
             mine.signature = signature
             self._take_signature(mine, signature)
+        if not valve.sampled:
+            return
         trace = valve.traces['measurement']
         if trace.newest > mine.seen or trace.newest < mine.seen - NANO:
             rows = trace.since(mine.seen + 1 if trace.newest > mine.seen else 0)

@@ -37,9 +37,10 @@ class Unseen:
             self._present = False
         step = stamp - self._newest
         if self._newest and step > 0:
-            usual = median(self._steps) if self._steps else step
-            if self._present and step > max(SHORTEST, 3 * usual):
-                self.seconds += step / SECOND
+            if self._present and step > SHORTEST:
+                usual = median(self._steps) if self._steps else step
+                if step > 3 * usual:
+                    self.seconds += step / SECOND
             self._steps.append(step)
         self._newest = max(stamp, self._newest) if step > -SHORTEST else stamp
         self._present = present

@@ -5,14 +5,26 @@
 import math
 from collections import deque
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple
 
 from damadics_fd.core.stamps import SECOND as NANO
 from damadics_fd.core.text import NAME, plain
-from damadics_fd.ros.freshness import Freshness, default_max_age, judged_stamp
+from damadics_fd.ros.freshness import Freshness, counted_stamp, default_max_age
 from damadics_msgs.msg import FaultEvent, FaultFlag, Isolation, Signature
 
-from damadics_dashboard.live.raw import Batch
+from damadics_dashboard.live.judged import (
+    ALARM,
+    HEALTHY,
+    LATCHED,
+    LEARNING,
+    NOT_MONITORING,
+    SHELVED,
+    UNKNOWN,
+    Judged,
+    judged_of,
+)
+from damadics_dashboard.live.raw import Batch, batches
 from damadics_dashboard.live.traces import Trace
 from damadics_dashboard.live.unseen import Unseen
 from damadics_dashboard.store.rows import EventRow
@@ -28,7 +40,7 @@ NE107 = {
     FaultFlag.NE107_FUNCTION_CHECK: 'C',
     FaultFlag.NE107_FAILURE: 'F',
 }
-ALARMS = (FaultFlag.STATE_ALARM, FaultFlag.STATE_LATCHED, FaultFlag.STATE_UNKNOWN)
+ALARMS = (ALARM, LATCHED, UNKNOWN)
 
 
 class Condition(NamedTuple):
@@ -43,6 +55,9 @@ class Condition(NamedTuple):
     def alarm(self) -> bool:
         """Whether the valve is shown in the colour of an alarm."""
         return self.kind in 'MSF'
+
+
+WELL = Condition('ok', 'healthy', 'no_alarm')
 
 
 @dataclass
@@ -76,7 +91,7 @@ class Valve:
         self.name = name
         self.tag = ''
         self._configured = False  # the tag is the one that its nodes were given
-        self.flag: FaultFlag | None = None
+        self.flag: Judged | None = None
         self.flag_at = -1e9
         self.threshold_at = -1e9
         self.judged = -1  # ns, stamp of the flag that its age was last counted from
@@ -96,25 +111,18 @@ class Valve:
         self.peak = 0.0  # largest residual / threshold of this second
         self.ratio = 0.0  # of the second before
         self.lost = 0
-        self.batches = {
-            'measurement': Batch(
-                'damadics_msgs/msg/Measurement',
-                {name: name for name in ('cv', 'x1', 'p1', 'p2', 'flow', 't1', 'ps')},
-            ),
-            'estimate': Batch(
-                'damadics_msgs/msg/Estimate',
-                {
-                    'x2': 'x2',
-                    'residual': 'xi2',
-                    'u': 'u',
-                    'x': 'x1',
-                    'progress': 'progress',
-                    'phase': 'phase',
-                },
-            ),
-            'threshold': Batch('damadics_msgs/msg/Float64Stamped', {'rho': 'data'}),
-        }
-        self.traces = {
+        self.sampled = False  # its samples are or were taken, so that there are traces
+
+    @cached_property
+    def batches(self) -> dict[str, Batch]:
+        """Samples that have arrived, by topic; of most valves of a large fleet there are none."""
+        return batches()
+
+    @cached_property
+    def traces(self) -> dict[str, Trace]:
+        """Samples by topic."""
+        self.sampled = True
+        return {
             topic: Trace(batch.columns, WINDOW, MOST_SAMPLES)
             for topic, batch in self.batches.items()
         }
@@ -150,15 +158,25 @@ class Valve:
         :param flag: the message.
         :param now: monotonic time [s].
         """
-        if flag.threshold > 0.0:
-            self.peak = max(self.peak, flag.residual / flag.threshold)
         if flag.header.frame_id and not self._configured:
             self.tag = plain(flag.header.frame_id, NAME)
-        self.flag, self.flag_at = flag, now
-        stamp = judged_stamp(flag)
-        if stamp is not None:
-            self.unseen.judged(stamp, flag.occurrence, present=flag.fault)
-        if stamp is not None and self.threshold_at < 0.0 and stamp != self.judged:
+        self.take(judged_of(flag), now)
+
+    def take(self, judged: Judged, now: float) -> None:
+        """
+        Take a judgement.
+
+        :param judged: of the valve's own detector or of a fleet.
+        :param now: monotonic time [s].
+        """
+        if judged.threshold > 0.0:
+            self.peak = max(self.peak, judged.residual / judged.threshold)
+        self.flag, self.flag_at = judged, now
+        stamp = counted_stamp(judged.state, judged.stamp)
+        if stamp is None:
+            return
+        self.unseen.judged(stamp, judged.occurrence, present=judged.fault)
+        if self.threshold_at < 0.0 and stamp != self.judged:
             self.freshness.heard(stamp, now)
             self.judged = stamp
 
@@ -186,7 +204,7 @@ class Valve:
     @property
     def occurrence(self) -> int:
         """Number of the latest alarm that an event told of."""
-        return max((e['occurrence'] for e in self.events), default=0)
+        return max(e['occurrence'] for e in self.events) if self.events else 0
 
     def forget(self, topic: str) -> None:
         """
@@ -201,8 +219,11 @@ class Valve:
 
     def second(self) -> None:
         """Close one second of the bar that shows the largest residual against its limit."""
-        rows, limits = self.traces['estimate'].rows, self.traces['threshold'].rows
-        if len(rows) and len(limits):
+        if (
+            self.sampled
+            and len(rows := self.traces['estimate'].rows)
+            and len(limits := self.traces['threshold'].rows)
+        ):
             recent = rows[-max(int(1.0 / max(self.period, 1e-3)), 1) :]
             if limits['rho'][-1] > 0.0:
                 self.peak = max(self.peak, float(recent['residual'].max()) / limits['rho'][-1])
@@ -224,8 +245,7 @@ class Valve:
     @property
     def progress(self) -> float:
         """Share of the learning that is done, 0..1."""
-        rows = self.traces['estimate'].rows
-        if len(rows):
+        if self.sampled and len(rows := self.traces['estimate'].rows):
             return float(rows['progress'][-1])
         if math.isfinite(self.learned):
             return self.learned
@@ -246,27 +266,27 @@ class Valve:
         silent = self._silence(flag, now, clock)
         if silent is not None:
             return silent
-        if flag.state == FaultFlag.STATE_NOT_MONITORING:
+        if flag.state == NOT_MONITORING:
             return Condition('off', 'not_monitored', 'input_refused')
-        if flag.state == FaultFlag.STATE_SHELVED:
+        if flag.state == SHELVED:
             return Condition('C', 'shelved', 'masked')
-        if flag.state == FaultFlag.STATE_UNKNOWN:
+        if flag.state == UNKNOWN:
             return Condition('C', 'state_unknown', 'confirm_state')
         letter = NE107.get(flag.level, 'C') or 'M'
         if flag.state in ALARMS:
-            active = flag.state == FaultFlag.STATE_ALARM
+            active = flag.state == ALARM
             return Condition(letter, f'ne_{letter}', 'fault_present' if active else 'fault_gone')
-        if flag.state == FaultFlag.STATE_LEARNING:
+        if flag.state == LEARNING:
             return Condition('learn', 'learning', 'learned_share', self.progress)
-        if flag.state == FaultFlag.STATE_HEALTHY:
-            return Condition('ok', 'healthy', 'no_alarm')
+        if flag.state == HEALTHY:
+            return WELL
         return Condition('C', 'state_unknown', 'confirm_state')
 
-    def _silence(self, flag: FaultFlag, now: float, clock: int) -> Condition | None:
+    def _silence(self, flag: Judged, now: float, clock: int) -> Condition | None:
         """Tell where nothing recent is known of the valve."""
         quiet = now - self.threshold_at
         heard = self.threshold_at > 0.0
-        refused = flag.state == FaultFlag.STATE_NOT_MONITORING
+        refused = flag.state == NOT_MONITORING
         if now - self.flag_at > HEARTBEAT_LOST or (
             heard
             and quiet > max(SAMPLES_LOST, 3.0 * self.period)
@@ -291,32 +311,28 @@ class Valve:
         flag = self.flag
         if flag is None:
             return None
-        if flag.state == FaultFlag.STATE_UNKNOWN:
+        if flag.state == UNKNOWN:
             return Alarm(flag.occurrence, FaultFlag.NE107_FUNCTION_CHECK, 'unknown', False, 0)
         if flag.occurrence == 0:
             return None
-        if not flag.fault and flag.state not in (*ALARMS, FaultFlag.STATE_SHELVED):
+        if not flag.fault and flag.state not in (*ALARMS, SHELVED):
             return None
         mine = [e for e in self.events if e['occurrence'] == flag.occurrence]
         ends = [e for e in mine if e['transition'] in (FaultEvent.RESET, FaultEvent.RAISED)]
-        if flag.state == FaultFlag.STATE_SHELVED and (
-            not ends or ends[-1]['transition'] == FaultEvent.RESET
-        ):
+        if flag.state == SHELVED and (not ends or ends[-1]['transition'] == FaultEvent.RESET):
             return None
         told = [e for e in mine if e['transition'] in (FaultEvent.RAISED, FaultEvent.CHANGED)]
         cleared = bool(mine) and FaultEvent.CLEARED in (e['transition'] for e in mine)
-        state = {FaultFlag.STATE_ALARM: 'active', FaultFlag.STATE_LATCHED: 'returned'}.get(
+        state = {ALARM: 'active', LATCHED: 'returned'}.get(
             flag.state, 'returned' if cleared else 'active'
         )
         known = self.diagnostics.get('detector', {}).get('Acknowledged') == 'True'
-        onset = flag.onset.sec * NANO + flag.onset.nanosec
         evidence = told[-1].copy() if told else EventRow()
         if evidence and state == 'active':  # the event tells how it was then
-            stamp = flag.header.stamp.sec * NANO + flag.header.stamp.nanosec
             evidence |= {
                 'residual': flag.residual,
                 'threshold': flag.threshold,
-                'duration': max(stamp - onset, 0) / NANO,
+                'duration': max(flag.stamp - flag.onset, 0) / NANO,
                 'unseen': self.unseen.seconds,
             }
             if flag.threshold > 0.0:
@@ -330,8 +346,8 @@ class Valve:
         return Alarm(
             flag.occurrence,
             flag.level,
-            'shelved' if flag.state == FaultFlag.STATE_SHELVED else state,
+            'shelved' if flag.state == SHELVED else state,
             known or flag.occurrence in self.acknowledged,
-            onset,
+            flag.onset,
             evidence,
         )

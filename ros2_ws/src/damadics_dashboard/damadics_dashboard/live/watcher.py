@@ -35,6 +35,7 @@ from rclpy.subscription import Subscription
 
 from damadics_dashboard.live.calls import Calls, Field, Service, ServiceError
 from damadics_dashboard.live.fleet import SERVICES, FleetReport, shared
+from damadics_dashboard.live.overview import Overview
 from damadics_dashboard.live.record import action_row, event_row
 from damadics_dashboard.live.trend_points import TrendPoints
 from damadics_dashboard.live.valve import Valve
@@ -69,6 +70,7 @@ class Watcher:
         self._simulated = any('use_sim_time:=true' in word for word in ros_args)
         self._clock = 0  # ns
         self.valves: dict[str, Valve] = {}
+        self.overview = Overview(self.valves, lambda: self.clock)
         for name in history.valves():
             self._valve(name)
         self._tags = history.tags()
@@ -80,6 +82,7 @@ class Watcher:
         self._ros_args = list(ros_args)
         self._wanted: dict[str, float] = {}
         self._subscriptions: dict[tuple[str, str], Subscription] = {}
+        self._followed: set[str] = set()  # valves whose samples are taken
         self._calls = Calls()
         self._fleets: dict[str, FleetReport] = {}
         self._second = 0.0
@@ -216,8 +219,8 @@ class Watcher:
         now = self._ticked = time.monotonic()
         if self._simulated:
             self._clock = self._node.get_clock().now().nanoseconds
-        for valve in tuple(self.valves.values()):
-            valve.collect(now)
+        for name in self._followed:
+            self.valves[name].collect(now)
         if now - self._second >= 1.0:
             self._second = now
             for valve in tuple(self.valves.values()):
@@ -312,6 +315,7 @@ class Watcher:
         if (name, topic) in self._subscriptions:
             return
         valve = self.valves[name]
+        self._followed.add(name)
 
         def lost(event: QoSMessageLostInfo) -> None:
             valve.lost += event.total_count_change
@@ -330,6 +334,8 @@ class Watcher:
         if subscription is not None:
             self._node.destroy_subscription(subscription)
             self.valves[name].forget(topic)
+            if not any((name, other) in self._subscriptions for other in FAST):
+                self._followed.discard(name)
 
     def _take_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:

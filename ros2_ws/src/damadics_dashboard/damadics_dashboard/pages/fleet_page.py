@@ -2,13 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """The overview: one tile per valve, by area, found by search and class; and every alarm."""
 
-import time
-from typing import Literal, TypedDict
+import json
+import math
+from typing import TypedDict
 
 from damadics_fd.core.text import COMMENT, plain
 from nicegui import ui
 
-from damadics_dashboard.live.valve import Valve
+from damadics_dashboard.live.overview import Overview, Place, ratio_of
+from damadics_dashboard.live.valve import Condition, Valve
 from damadics_dashboard.live.watcher import Watcher
 from damadics_dashboard.pages.alarms import AlarmList
 from damadics_dashboard.pages.elements import markup, tell
@@ -18,10 +20,10 @@ from damadics_dashboard.words.valve_words import address, area_of, headline, of_
 
 PERIOD = 0.2  # s
 LARGE = 100  # valves from which on the page is drawn twice a second
-TURNS = 10  # of drawing in which the residuals of a large fleet are told once, for they never rest
-RESTLESS: tuple[Literal['ratio', 'share'], ...] = ('ratio', 'share')
+EVERY = 0.9  # s at least between two times that ages and residuals of a large fleet are told
 KINDS = ('F', 'S', 'M', 'C', 'off', 'learn', 'ok')
 START = 'ros2 run damadics_bringup run --simulate'
+Brief = tuple[str, str, str, str, Place]
 
 
 class Tile(TypedDict):
@@ -48,7 +50,6 @@ class Changes(TypedDict, total=False):
     """What has changed on the page since it was told last."""
 
     tiles: dict[str, Tile]
-    ages: list[float | None]  # s, of all valves
     order: list[str]
 
 
@@ -63,17 +64,21 @@ def fleet_page(watcher: Watcher) -> None:
         markup('fleet.html', t=t, classes=classes).classes('w-full')
         trouble = ui.label('').classes('note')
         markup('tiles.html', t=t, start=START).classes('w-full')
+        overview = watcher.overview
+
+        def alarmed() -> list[Valve]:
+            return [valve for valve in overview.valves if valve.name in overview.alarms]
+
         with card(t('alarms'), classes='w-full') as head:
             with head:
                 number = ui.label('').classes('sub')
-            alarms = AlarmList(watcher, lambda: tuple(watcher.valves.values()), t, name=True)
+            alarms = AlarmList(watcher, alarmed, t, name=True)
         tell('filters')
-        shown = Tiles(watcher, t)
+        shown = Tiles(overview, t)
 
         def update() -> None:
-            message = shown.news()
-            if message is not None:
-                tell('fleet', message)
+            overview.look()
+            ui.run_javascript(f'damadics.fleet({shown.message()})')
             present = alarms.update()
             number.set_text(t('number_present', number=present) if present else '')
             problem = watcher.history.problem or watcher.trends.problem
@@ -88,44 +93,75 @@ class Tiles:
     """
     What the browser knows of the tiles, so that only what has changed is sent.
 
-    :param watcher: the ROS side.
+    :param overview: the valves, as they were looked at last.
     :param t: the words.
     """
 
-    def __init__(self, watcher: Watcher, t: Texts) -> None:
-        self._watcher = watcher
+    def __init__(self, overview: Overview, t: Texts) -> None:
+        self._overview = overview
         self._t = t
         self._told: dict[str, Tile] = {}
-        self._order: list[str] | None = None
-        self._turn = 0
+        self._brief: dict[str, Brief] = {}
+        self._places: list[Place] = []
+        self._columns = -math.inf  # when ages and residuals were told last [s]
 
-    def news(self) -> Changes | None:
+    def message(self) -> str:
+        """
+        Return what the page's script is to be told.
+
+        :return: arguments of `damadics.fleet` as JSON: what has changed, and, not each time for a
+            large fleet, ages and residuals of all valves.
+        """
+        news = self.news()
+        words = json.dumps(news, separators=(',', ':'), allow_nan=False)
+        looked = self._overview.looked
+        if 'order' not in news and looked - self._columns < EVERY * (len(self._told) > LARGE):
+            return words
+        self._columns = looked
+        return f'{words},{self._overview.columns}'
+
+    def news(self) -> Changes:
         """
         Return what has changed.
 
-        :return: the message for `damadics.fleet`; ages are those of all valves.
+        :return: tiles by the name of their valves, and the order where that is another one.
         """
-        now, clock = time.monotonic(), self._watcher.clock
-        valves = sorted(self._watcher.valves.values(), key=lambda v: (v.area, v.title))
+        overview, now, clock = self._overview, self._overview.looked, self._overview.clock
         changed: dict[str, Tile] = {}
-        self._turn += 1
-        for number, valve in enumerate(valves, self._turn):
+        places = overview.places
+        for valve, condition, place in zip(
+            overview.valves, overview.conditions, places, strict=True
+        ):
+            name = valve.name
+            brief = brief_of(valve, condition, place) if name not in overview.alarms else None
+            if brief is not None:  # as nearly all of a large fleet
+                if self._brief.get(name) == brief:
+                    continue
+                self._brief[name] = brief
+            else:
+                self._brief.pop(name, None)
             told = tile(valve, self._t, now, clock)
-            before = self._told.get(valve.name)
-            if len(valves) > LARGE and number % TURNS and before and before['kind'] == 'ok':
-                for name in RESTLESS if told['kind'] == 'ok' else ():
-                    told[name] = before[name]
-            if before != told:
-                self._told[valve.name] = changed[valve.name] = told
-        ages = [valve.age(now, clock) for valve in valves]
-        message: Changes = {
-            'tiles': changed,
-            'ages': [None if age is None else round(age, 1) for age in ages],
-        }
-        order = [valve.name for valve in valves]
-        if order != self._order:
-            self._order = message['order'] = order
-        return message
+            if self._told.get(name) != told:
+                self._told[name] = changed[name] = told
+        news: Changes = {'tiles': changed}
+        if places != self._places:
+            self._places = places
+            news['order'] = [valve.name for valve in overview.valves]
+        return news
+
+
+def brief_of(valve: Valve, condition: Condition, place: Place) -> Brief | None:
+    """
+    Return what the words on a tile without an alarm depend on.
+
+    :param valve: the valve.
+    :param condition: of it.
+    :param place: area and title.
+    :return: it; None where they depend on more.
+    """
+    if condition.kind == 'ok' or (condition.kind == 'off' and not math.isnan(condition.value)):
+        return condition.kind, condition.title, condition.detail, valve.tag, place
+    return None
 
 
 def tile(valve: Valve, t: Texts, now: float, clock: int) -> Tile:
@@ -151,9 +187,7 @@ def tile(valve: Valve, t: Texts, now: float, clock: int) -> Tile:
         else:
             badge = t('acknowledged' if alarm.acknowledged else 'unacknowledged')
             why = t('state_lost') if alarm.state == 'unknown' else what
-    ratio = valve.ratio
-    if valve.flag is not None and valve.flag.threshold > 0.0:
-        ratio = max(ratio, valve.flag.residual / valve.flag.threshold)
+    ratio = ratio_of(valve)
     learning, monitored = condition.kind == 'learn', condition.kind != 'off'
     ratio = ratio if monitored else 0.0  # of a time that is over
     state = t(condition.title)

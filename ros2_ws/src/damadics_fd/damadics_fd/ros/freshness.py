@@ -18,6 +18,7 @@ WINDOW = 2.0  # s; two of them with the same delay after it say that it has
 IN_WINDOW = 3.0  # samples at least
 EVEN = 0.1  # s
 JUMP = 60.0  # s that a stamp may run ahead of the time that has passed
+NOT_MONITORING = FaultFlag.STATE_NOT_MONITORING
 AGREEING = 3  # samples in a row that make a jump ahead credible
 
 Item = TypeVar('Item')
@@ -42,8 +43,18 @@ def judged_stamp(flag: FaultFlag) -> int | None:
     :param flag: the message.
     :return: [ns]; None where the flag rests on no sample, or nobody knows when it was taken.
     """
-    stamp = flag.header.stamp.sec * SECOND + flag.header.stamp.nanosec
-    judges = flag.state != FaultFlag.STATE_NOT_MONITORING
+    return counted_stamp(flag.state, flag.header.stamp.sec * SECOND + flag.header.stamp.nanosec)
+
+
+def counted_stamp(state: int, stamp: int) -> int | None:
+    """
+    Return the stamp that the age of a judgement may be counted from, as `judged_stamp`.
+
+    :param state: of the flag.
+    :param stamp: of the flag [ns].
+    :return: [ns] or None.
+    """
+    judges = state != NOT_MONITORING
     return stamp if is_date(stamp) or (judges and stamp > 0) else None
 
 
@@ -91,6 +102,8 @@ class Freshness:
 
     def _note(self, stamp: int, steady: float) -> None:
         before, self._stamp = self._stamp, stamp
+        if before is not None and before >= DATE <= stamp:
+            return  # the clock alone tells the age of a date
         delay = steady - stamp / SECOND
         if before is None or stamp < before - BACK or (abs(before) < DATE) != (abs(stamp) < DATE):
             self._least = delay
