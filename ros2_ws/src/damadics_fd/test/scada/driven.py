@@ -19,6 +19,7 @@ def driven(
     at: int = 1 << 30,
     swing: float = 1.0,
     jump: float = math.nan,
+    air: float = 1.0,
     **faults: float,
 ) -> np.ndarray:
     """
@@ -27,6 +28,7 @@ def driven(
     :param at: from when on the faults act [s]; f7: [K], f17: share of P1.
     :param swing: how much the command moves.
     :param jump: of the command every 40 s, which is then held between samples.
+    :param air: in the chamber, over what pressure and volume say.
     """
     rng = np.random.default_rng(seed)
     act = SETTINGS.record()['act'][0]
@@ -45,6 +47,7 @@ def driven(
     some['f7'] = some['f17'] = 0.0
     drop = (p1 - p2) / P_RANGE
     start_stem(stem[0], act, 0.0)
+    stem[0].m_a *= air
     x, flow = np.empty(seconds), np.empty(seconds)
     for k in range(seconds):
         fault = some[0] if k >= at else none[0]

@@ -88,6 +88,16 @@ def start_stem(m: StemState, act: Valve, t: float) -> None:
 
 
 @jit
+def air_over_rest(m: StemState, act: Valve) -> float:
+    """Return how much air the chamber holds over what pressure and volume say; 1 at the start."""
+    volume = act.open_volume + act.signed_area * m.X
+    if not m.p * volume > 0.0:
+        return 1.0
+    value: float = m.m_a * GAS / (m.p * volume)
+    return value
+
+
+@jit
 def copy_stem(source: StemState, target: StemState) -> None:
     """Copy one stem state into another."""
     target.tick = source.tick

@@ -25,6 +25,7 @@ Floats = NDArray[np.float64]
 KEPT = ('alarm', 't_alarm', 't_onset', 'test', 'occurrence', 'stood', 'recovery', 'stands')
 FLOW_TEST = [test.residual for test in TESTS].index(R2) + 1
 LEARN_AGAIN_S = 60.0
+AIR_TOLD = 0.05
 ROUGH = 1.3  # noise that has grown by this factor is told
 
 
@@ -56,7 +57,7 @@ class ScadaMonitor:
     Watch one valve at 1 Hz.
 
     Without a reference it first learns from its own start (`learn_s`); the record must be
-    fault-free. Nothing adapts afterwards.
+    fault-free.
 
     :param settings: what the user states.
     :param reference: structured array of `REFERENCE` from `learn`; learned on line where absent.
@@ -248,6 +249,10 @@ class ScadaMonitor:
             told.append(f'the stem has drifted by {100.0 * stem:+.1f} % of the stroke')
         if abs(flow) > FLOW_TOLD:
             told.append(f'the flow has drifted by {100.0 * math.expm1(flow):+.0f} %')
+        slower = math.expm1(float(self.state.air))
+        if abs(slower) > AIR_TOLD:
+            word = 'slower' if slower > 0.0 else 'quicker'
+            told.append(f'the air path is {100.0 * abs(slower):.0f} % {word} than learned')
         for name, r in (('stem', R1), ('flow', R2)):
             factor = float(rougher(self.state, self.reference[0], r, 1))
             if factor > ROUGH:

@@ -110,7 +110,12 @@ class MonitorState(Record):
     steady: int  # samples in a row at the period
     strange: int  # samples in a row at another period than the learned one
     innovation: Annotated[Floats, 2]  # of P1, P2; NaN until as many as taps are steady
-    stem: Annotated[Rows[StemState], 2]  # nominal, wide play
+    stem: Annotated[Rows[StemState], 3]  # nominal, wide play, a trial
+    air: (
+        float  # logarithm of the air that was found in the models at the start, see judging/air.py
+    )
+    air_looks: int  # that were taken at it
+    air_since: int  # samples before the last one
     track: StemTrack
     xs: float  # slow copy of the stem law
     xq: float  # quick copy

@@ -3,6 +3,7 @@
 """The compiled step of the SCADA-rate monitor: one sample into two residuals and the tests."""
 
 from damadics_fd.core.jit import jit
+from damadics_fd.core.scada.judging.air import LOOKS, seek_air
 from damadics_fd.core.scada.judging.decide import decide
 from damadics_fd.core.scada.judging.predict import predict
 from damadics_fd.core.scada.judging.residuals import residuals
@@ -36,3 +37,5 @@ def step(
     predict(s, cfg, ref, t, cv, x, p1, p2, t1, flow)
     residuals(s, ref, x, p1, p2, t1, flow)
     decide(s, ref)
+    if s.air_looks < len(LOOKS):
+        seek_air(s, cfg, ref)

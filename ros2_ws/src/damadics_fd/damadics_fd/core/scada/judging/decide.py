@@ -16,6 +16,7 @@ LLR_CLIP = 8.0
 MOTION = 0.003  # of the stroke: the stem has moved
 HELD = 10  # samples at rest after which its play may hold a stem beside its law
 SHOWN = 60  # samples after a motion that show its friction
+FIRST_OF_R1 = [test.residual for test in TESTS].index(R1)
 SCALES = np.array([2 if test.block >= 30 else 1 for test in TESTS])  # of the roughness
 # Multiples of its limit beyond which a statistic does not grow, so that it comes back in time
 # after the fault: by how quick the test is.
@@ -204,8 +205,11 @@ def test_friction(s: MonitorState, ref: Reference) -> None:
     if s.testable[R1] > 0 and s.rest < SHOWN:
         s1 = ref.s1 * rougher(s, ref, R1, 1)
         z1 = s.residual[R1] / s1
-        z1d = (s.residual[R1] + s.xm[0] - s.xd) / s1
-        gain = (z1 * z1 - z1d * z1d) / (2.0 * ref.kap2)
+        wider = (s.xm[0] - s.xd) / s1
+        z1d = z1 + wider
+        # away from where it was learned the bias of the model may favour the wider play
+        unsure = ref.se[FIRST_OF_R1] * (s.lever[R1] - 1.0)
+        gain = (0.5 * (z1 * z1 - z1d * z1d) - abs(wider) * unsure) / ref.kap2
         s.llr += min(max(gain, -LLR_CLIP), LLR_CLIP)
         s.llr = min(s.llr, CAPS[0] * ref.llr_limit)
         if s.llr <= 0.0:

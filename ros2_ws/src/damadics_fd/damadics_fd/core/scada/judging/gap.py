@@ -9,7 +9,7 @@ from damadics_fd.core.scada.judging.decide import silence
 from damadics_fd.core.scada.judging.pressure import TAPS
 from damadics_fd.core.scada.judging.roughness import break_off
 from damadics_fd.core.scada.laws.stem_law import start_track
-from damadics_fd.core.scada.model import copy_stem, start_stem
+from damadics_fd.core.scada.model import air_over_rest, copy_stem, start_stem
 from damadics_fd.core.scada.settings import ScadaConfig
 from damadics_fd.core.scada.state import LAW, MonitorState, Reference
 
@@ -47,6 +47,7 @@ def begin_again(s: MonitorState, cfg: ScadaConfig, ref: Reference, t: float) -> 
         s.stood = False
         s.t_gone = t
         s.level[:] = math.nan
+        s.air_looks = 0
 
 
 @jit
@@ -85,7 +86,9 @@ def restart(
     s.f_lagged = math.nan
     s.f_slow = math.nan
     s.last[:] = math.nan
+    more = air_over_rest(s.stem[0], cfg.act) if s.filled > 0 else 1.0
     start_stem(s.stem[0], cfg.act, t)
+    s.stem[0].m_a *= more
     copy_stem(s.stem[0], s.stem[1])
     s.fault[1].f4 = cfg.wide_play - cfg.act.stem_play
     s.filled = 0

@@ -13,19 +13,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from damadics_fd.core.jit import jit
-from damadics_fd.core.scada.judging.cusum import P1, P2, PROCESS, R2, T1, TESTS
-from damadics_fd.core.scada.laws.actuator import F_RANGE, P_RANGE, T_RANGE, valve_flow
-from damadics_fd.core.scada.model import (
-    COARSE_SUB_STEPS,
-    FAULTS,
-    STEM,
-    STEM_FAULTS,
-    Faults,
-    StemState,
-    advance_stem,
-    copy_stem,
-)
+from damadics_fd.core.scada.judging.cusum import P1, P2, PROCESS, R1, R2, T1, TESTS
+from damadics_fd.core.scada.laws.actuator import T_RANGE
+from damadics_fd.core.scada.model import FAULTS, STEM, STEM_FAULTS
+from damadics_fd.core.scada.naming.errors import flow_error, stem_error
 from damadics_fd.core.scada.naming.names import (
     EQUAL,
     GROUPS,
@@ -44,7 +35,6 @@ from damadics_fd.core.scada.state import (
     MonitorState,
     Reference,
 )
-from damadics_fd.core.valve.parameters import Valve
 
 __all__ = ['GROUPS', 'NAMES', 'Hypothesis', 'Isolation', 'Isolator', 'group_of']
 
@@ -63,68 +53,6 @@ HYPOTHESES = tuple(n for n in NAMES if n not in (7, 17))
 GRID = (0.03, 0.15, 0.35, 0.6, 0.85)
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 REFINED = 6  # hypotheses whose strength is refined
-
-
-@jit
-def _stem_error(
-    window: np.ndarray, act: Valve, fault: Faults, stem: StemState, late: bool
-) -> float:
-    """Return the mean squared error of X' under a fault that is present in the whole window."""
-    copy_stem(window[0].stem, stem)
-    if late:  # the fault has been there for long: start from the position it has led to
-        stem.X = window[0].x / (1.0 + 1.25 * fault.f13) * act.stroke
-        stem.x += stem.X - window[0].stem.X
-        stem.feedback = stem.X
-    total = 0.0
-    for i in range(window.shape[0]):
-        e = window[i]
-        x = advance_stem(
-            stem,
-            act,
-            fault,
-            e.t0,
-            e.t,
-            e.cv0,
-            e.cv,
-            e.dp0,
-            e.dp,
-            e.slope0,
-            e.slope,
-            COARSE_SUB_STEPS,
-        )
-        total += (e.x - x - e.correction) ** 2
-    mean: float = total / window.shape[0]
-    return mean
-
-
-@jit
-def _flow_error(window: np.ndarray, act: Valve, fault: Faults, g0: float, g1: float) -> float:
-    """Return the mean squared error of F' in units of its sigma; NaN where F' is not measured."""
-    offset = 0.2 * fault.f2 - 0.1 * fault.f3
-    scale = (1.0 - 0.2 * fault.f2) * (1.0 + 0.1 * fault.f3)
-    gain = (1.0 - 0.05 * fault.f5) * (1.0 - fault.f19)
-    sensor = 1.0 + 1.25 * fault.f13
-    total = 0.0
-    n = 0
-    for i in range(window.shape[0]):
-        e = window[i]
-        if math.isnan(e.flow) or math.isnan(e.t1):
-            continue
-        flow = valve_flow(
-            act,
-            e.x / sensor,
-            e.p1 * P_RANGE,
-            e.p2 * P_RANGE,
-            e.t1 * T_RANGE,
-            offset,
-            scale,
-            0.1 * fault.f6,
-            fault.f18,
-        )
-        f = min(1.0, gain * (g0 + g1 * flow / F_RANGE))
-        total += ((e.flow - f) / e.sq) ** 2
-        n += 1
-    return total / n if n else math.nan
 
 
 def last_evidence(state: MonitorState) -> float:
@@ -146,6 +74,27 @@ def misfit(error: float, variance: float) -> float:
     return math.log(ratio) if ratio > 1.0 else ratio - 1.0
 
 
+def occam(fault: int, rise: float, step: float) -> float:
+    """
+    Return what a strength costs that had to be found among all that were possible, nats.
+
+    All strengths are equally likely before. A fault of which only few would do (a hundredth of
+    its range, say) had to be lucky to explain the record; one of which many would do had not.
+
+    :param fault: number of the fault.
+    :param rise: of the cost from the best strength to a step on either side, sum of both, nats.
+    :param step: the step.
+
+    >>> round(occam(2, 1.0, 0.01), 1), round(occam(19, 1.0, 0.01), 1), occam(2, 0.0, 0.01)
+    (3.7, 4.4, 0.0)
+    """
+    reach = 2.0 if fault in TWO_SIDED else 1.0
+    if not rise > 0.0:
+        return 0.0
+    width = math.sqrt(2.0 * math.pi / rise) * step
+    return max(math.log(reach / width), 0.0)
+
+
 class Isolator:
     """
     Rank the faults for one monitor.
@@ -162,6 +111,8 @@ class Isolator:
         self._mean_t1 = float(reference.mu[tests.index(T1)])
         self._nominal = (math.nan, math.nan)
         self._late = False
+        self._alike = float(reference.kap2)  # so many neighbouring errors tell as much as one
+        self._bias = float(np.max((reference.se * reference.sd)[np.equal(tests, R1)]))
         self._variance = (
             float(reference.s1) ** 2,
             float(reference.sd[tests.index(R2)]) ** 2 or 1.0,
@@ -248,13 +199,15 @@ class Isolator:
         nominal = np.zeros(1, FAULTS)
         if stem is not None or flow is None:
             faults = nominal if stem is None else stem
-            of_stem = _stem_error(window, self._act, faults[0], self._stem[0], self._late)
+            of_stem = stem_error(
+                window, self._act, faults[0], self._stem[0], self._late, self._bias
+            )
         else:
             of_stem = self._nominal[0]
         if flow is not None or stem is None:
             faults = nominal if flow is None else flow
             g0, g1 = self._ref.g0, self._ref.g1
-            of_flow = _flow_error(window, self._act, faults[0], g0, g1)
+            of_flow = flow_error(window, self._act, faults[0], g0, g1)
         else:
             of_flow = self._nominal[1]
         return float(of_stem), float(of_flow)
@@ -277,7 +230,7 @@ class Isolator:
         if fault in SEAT:
             stem = min(stem, self._nominal[0])
         n = 0.5 * len(window)
-        total = n * misfit(stem, self._variance[0])
+        total = n * misfit(stem, self._variance[0]) / self._alike
         if not math.isnan(flow):
             total += n * misfit(flow, self._variance[1])
         return total
@@ -316,5 +269,7 @@ class Isolator:
                 low, left, at_left = left, right, at_right
                 right = low + GOLDEN * (high - low)
                 at_right = self.cost(window, fault, right)
-        best = min(best, (at_left, left), (at_right, right))
-        return Hypothesis(fault, best[1], best[0])
+        cost, strength = min(best, (at_left, left), (at_right, right))
+        step = max(high - low, 1e-4)
+        around = [self.cost(window, fault, strength + side) for side in (-step, step)]
+        return Hypothesis(fault, strength, cost + occam(fault, sum(around) - 2.0 * cost, step))

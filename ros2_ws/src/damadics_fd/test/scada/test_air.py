@@ -1,0 +1,49 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""A monitor of the stated actuator that begins when its plant has long been running."""
+
+import dataclasses
+import math
+
+import pytest
+from damadics_fd.core.scada.learning import learn
+from damadics_fd.core.scada.monitor import ScadaMonitor
+
+from .driven import SETTINGS, driven
+
+LATE = dataclasses.replace(SETTINGS, t_on_s=200.0)
+
+
+@pytest.fixture(scope='module')
+def reference():
+    """Learn the stated actuator as it is when it has just been put to work."""
+    return learn(driven(270, seed=1), SETTINGS)
+
+
+@pytest.mark.parametrize('air', [1.1, 1.25])
+def test_a_plant_that_has_been_running_for_long_is_no_fault(reference, air):
+    monitor = ScadaMonitor(LATE, reference)
+    trace = monitor.run_samples(driven(900, seed=21, air=air))
+    assert not trace['alarm'].any()
+    assert 'slower than learned' in monitor.drifts()[0]
+    assert math.exp(float(monitor.state.air)) == pytest.approx(air, abs=0.05)
+
+
+def test_what_was_found_is_kept_over_a_gap(reference):
+    rows = driven(900, seed=22, air=1.25)
+    monitor = ScadaMonitor(LATE, reference)
+    monitor.run_samples(rows[:500])
+    looks = int(monitor.state.air_looks)
+    assert not monitor.run_samples(rows[620:])['alarm'].any()
+    assert int(monitor.state.air_looks) == looks
+
+
+@pytest.mark.parametrize('fault', [{'f12': 0.6}, {'f13': 0.15}, {'f15': 0.5}])
+def test_a_fault_that_was_there_before_the_monitor_is_not_taken_for_it(reference, fault):
+    trace = ScadaMonitor(LATE, reference).run_samples(driven(260, 23, 0, **fault))
+    assert trace['alarm'][-1]
+
+
+def test_a_fault_is_found_beside_it(reference):
+    trace = ScadaMonitor(LATE, reference).run_samples(driven(420, 24, 380, air=1.25, f11=0.4))
+    assert 380 <= trace['t'][trace['alarm']][0] <= 384

@@ -1,0 +1,30 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Faults that follow the same law: the one of which most strengths would do comes first."""
+
+import pytest
+from damadics_fd.core.scada.learning import learn
+from damadics_fd.core.scada.monitor import ScadaMonitor
+from damadics_fd.core.scada.naming.isolation import Isolator
+
+from .driven import SETTINGS, driven
+
+
+@pytest.fixture(scope='module')
+def reference():
+    """Learn the stated actuator from four minutes."""
+    return learn(driven(270, seed=1), SETTINGS)
+
+
+@pytest.mark.parametrize(
+    ('fault', 'strength', 'like'), [(3, 0.25, 19), (5, 0.5, 2), (5, 0.5, 19), (19, 0.3, 2)]
+)
+@pytest.mark.parametrize('seed', [31, 32, 33])
+def test_like_faults_that_have_grown(reference, fault, strength, like, seed):
+    monitor = ScadaMonitor(SETTINGS, reference)
+    monitor.run_samples(driven(700, seed, 60, **{f'f{fault}': strength}))
+    found = Isolator(monitor.record[0], reference[0]).isolate(monitor.state, abrupt=False)
+    assert found.best.fault == fault
+    assert found.best.strength == pytest.approx(strength, rel=0.2)
+    costs = {h.fault: h.cost for h in found.ranking}
+    assert costs[like] > costs[fault]
