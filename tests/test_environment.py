@@ -70,7 +70,9 @@ def test_ros2_pkg_prefix_and_list():
     ('command', 'says'),
     [
         ('ros2 run no_such_package detector', "Package 'no_such_package' not found"),
-        ('ros2 run damadics_fd no_such_executable', 'No executable found'),
+        ('ros2 run damadics_fd no_such_executable', 'No executable found: there are'),
+        ('ros2 run damadics_fd detectr', 'No executable found: do you mean detector?'),
+        ('ros2 run damadics_df detector', "'damadics_df' not found: do you mean damadics_fd?"),
         ('ros2 pkg prefix no_such_package', 'Package not found'),
         ('ros2 pkg executables no_such_package', "Package 'no_such_package' not found"),
     ],

@@ -165,6 +165,17 @@ def test_the_plots_follow_five_times_a_second(system, page):
     assert 20 < max(points) < 1000, 'decimated to what a screen can show'
 
 
+def test_what_is_below_the_fold_is_drawn_before_somebody_scrolls_to_it(system, page):
+    page.set_viewport_size({'width': 390, 'height': 600})
+    page.goto(f'{system.site.address}/valve/{VALVE}')
+    page.wait_for_selector('[data-plot]', state='attached')
+    flow = "getElement(Number(document.querySelectorAll('[data-plot]')[3].dataset.plot)).chart"
+    page.wait_for_function(f'{flow} && {flow}.getOption().series[0].data.length > 0')
+    assert page.evaluate('scrollY') == 0
+    assert page.locator('.plot').nth(3).bounding_box()['y'] > 1200, 'more than a screen away'
+    page.wait_for_function(f'!{flow}.getZr().animation._running')  # it asks for no more frames
+
+
 def test_an_injected_fault_shows_within_a_second_of_its_flag(system, page):
     system.valve.be_healthy()
     fleet = website.new_page(system.browser)
@@ -288,6 +299,13 @@ def test_replay_of_a_golden_bag_shows_its_fault(system, page):
     assert 'fault f4 was simulated from 70.00 s, flagged' in page.locator('.banner').inner_text()
     page.wait_for_timeout(1500)
     website.picture(page, 'replay.png')
+
+
+def test_a_file_of_another_kind_is_not_said_to_be_too_large(system, page):
+    page.goto(f'{system.site.address}/replay')
+    notes = {'name': 'notes.docx', 'mimeType': 'x/y', 'buffer': b'notes'}
+    page.set_input_files('.drop input[type=file]', files=[notes])
+    page.wait_for_selector('.q-notification >> text=The page reads MCAP, CSV')
 
 
 def test_replay_of_a_broken_file_says_why(system, page, tmp_path):

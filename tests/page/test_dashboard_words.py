@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the page says of commissioning, tags, residuals and trends, without a browser."""
 
+import ast
+import inspect
 import math
 
 import numpy as np
@@ -17,9 +19,12 @@ from damadics_dashboard.pages.replay_page import truth_words
 from damadics_dashboard.pages.valve.trend_card import points_of
 from damadics_dashboard.report.content import Sources, valve_report
 from damadics_dashboard.store.history import History
+from damadics_dashboard.words.answers import answer_words, result_words
 from damadics_dashboard.words.commission import commission_words
 from damadics_dashboard.words.texts import texts, use_causes
 from damadics_dashboard.words.valve_words import headline, history_rows
+from damadics_fd.core.decision import requests
+from damadics_fd.nodes import partial_strokes
 from damadics_fd.store.intervals import Intervals, Series
 from damadics_fd.store.trends import TrendFile
 from damadics_msgs.msg import FaultEvent, FaultFlag
@@ -89,6 +94,48 @@ def test_the_history_says_what_is_wrong_in_words_and_not_the_programmers(text):
     assert headline(row, DE)[0].endswith('bis 102 % der Grenze.')
     (gone,) = history_rows([{**event(FaultEvent.CLEARED, 'cleared 1: ...'), 'duration': 64.0}], DE)
     assert gone['text'] == 'Es dauerte 1 min 4 s.'
+
+
+def test_a_near_miss_is_a_sentence_and_no_glossary_is_needed():
+    (row,) = history_rows([{**event(FaultEvent.NEAR_MISS, 'near miss'), 'ratio': 0.93}], DE)
+    assert row['text'] == (
+        'Das Residuum stieg auf 93 % der Grenze und fiel wieder; es gab keinen Alarm.'
+    )
+
+
+def sentences(module, wanted):
+    """Return what a module answers, with numbers where it fills something in."""
+    for node in ast.walk(ast.parse(inspect.getsource(module))):
+        for text in wanted(node):
+            if isinstance(text, ast.Constant) and isinstance(text.value, str):
+                yield text.value
+            elif isinstance(text, ast.JoinedStr):
+                parts = (p.value if isinstance(p, ast.Constant) else '7' for p in text.values)
+                yield ''.join(map(str, parts))
+
+
+def answers(node):
+    if isinstance(node, ast.Call) and getattr(node.func, 'id', '') == 'Answer':
+        yield node.args[1]
+
+
+def refusals(node):
+    if isinstance(node, ast.FunctionDef) and node.name == '_refusal':
+        for inner in ast.walk(node):
+            if isinstance(inner, ast.Return):
+                yield inner.value
+
+
+@pytest.mark.parametrize(('module', 'wanted'), [(requests, answers), (partial_strokes, refusals)])
+def test_what_nodes_answer_is_told_in_the_readers_language(module, wanted):
+    found = [text for text in sentences(module, wanted) if text]
+    assert len(found) >= 8
+    for text in found:
+        assert answer_words(text, 'de') != text, text
+        assert answer_words(text, 'en') == text
+    row = {'result': 'there is no alarm to reset', 'done': False}
+    assert result_words(row, DE) == 'abgelehnt: Es gibt keinen Alarm zurückzusetzen.'
+    assert result_words({'result': 'a word of its own', 'done': True}, DE) == 'a word of its own'
 
 
 def test_a_valve_that_is_not_monitored_shows_no_residual_of_before():

@@ -5,6 +5,7 @@
 import csv
 import io
 import math
+import re
 import resource
 import time
 from datetime import datetime
@@ -12,6 +13,7 @@ from datetime import datetime
 import pytest
 from damadics_dashboard.report.command import main
 from damadics_dashboard.report.content import alarms_of, reliability
+from damadics_dashboard.report.forms import numeric_columns
 from damadics_dashboard.store.history import History
 from damadics_fd.store.intervals import DAY, Intervals
 from damadics_msgs.msg import FaultEvent
@@ -103,6 +105,26 @@ def test_a_valve_year_tells_cause_size_dates_and_who_did_what(year, tmp_path, ca
     )
     assert [row['cause'] for row in rows] == ['friction_up', '', '', '']
     assert [line.rpartition('.')[2] for line in lines] == ['html', 'pdf', 'csv', 'csv']
+
+
+def test_tables_on_paper_are_not_filled_with_the_colour_of_a_chart(year, tmp_path):
+    assert report(year, tmp_path, 'lv101', '--as', 'pdf') == 0
+    fills = []
+    for page in pypdf.PdfReader(tmp_path / 'report_lv101.pdf').pages:
+        drawn = page.get_contents().get_data().decode('latin1')
+        drawn = re.sub(r'(?s)\bq\b.*?\bQ\b', '', drawn)  # texts, each in its own colour
+        color = ''
+        for found in re.finditer(r'([\d. ]+ rg|[\d.]+ g)\b|\bre\s+f\b', drawn):
+            color = found[1] or color
+            if not found[1]:
+                fills.append([float(x) for x in color.split()[:-1]])
+    assert fills and all(min(fill) == 1.0 for fill in fills), fills
+
+
+def test_numbers_stand_one_under_the_other_and_names_do_not():
+    rows = [['Friction', '+165 %', 'in about 190 days'], ['Travel', '30 1/h', '']]
+    assert numeric_columns(['Quantity', 'End', 'Outlook'], rows) == [False, True, False]
+    assert numeric_columns(['Time', 'Who'], [['1', '']]) == [False, False]
 
 
 def test_trends_for_a_spreadsheet_have_units_and_times(year, tmp_path):

@@ -3,10 +3,13 @@
 """Command `init`: from nothing to the files of a plant."""
 
 import argparse
+import math
 import re
 import sys
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 from damadics_fd.core.text import NAME as LONGEST
 from damadics_fd.core.text import plain
@@ -20,6 +23,8 @@ EXAMPLES = """examples:
   ros2 run damadics_bringup init my_plant --valve LV-101 --mode scada --simulate"""
 MODES = ('monitor', 'scada')
 RATES = {'monitor': 200.0, 'scada': 1.0}
+MOST_RATE = 10_000.0  # Hz
+T = TypeVar('T')
 
 
 class InitError(ValueError):
@@ -54,6 +59,20 @@ def valve_name(tag: str) -> str:
     if not NAME.fullmatch(name):
         raise InitError(f'{tag!r} is no tag: give letters and digits, such as LV-101')
     return name
+
+
+def names_of(tags: Sequence[str]) -> list[str]:
+    """
+    Make the names of valves out of their tags.
+
+    :param tags: as people at the plant know them.
+    :return: names.
+    :raises InitError: where one is no tag, or two give one name.
+    """
+    names = [valve_name(tag) for tag in tags]
+    if len(set(names)) < len(names):
+        raise InitError(f'two tags give the same name: {", ".join(names)}')
+    return names
 
 
 def fleet_text(plan: Plan) -> str:
@@ -138,9 +157,7 @@ def write(plan: Plan) -> list[Path]:
     :return: their paths.
     :raises InitError: where there are such files already, or two valves would have one name.
     """
-    names = [valve_name(tag) for tag in plan.tags]
-    if len(set(names)) < len(names):
-        raise InitError(f'two tags give the same name: {", ".join(names)}')
+    names_of(plan.tags)
     files = {'fleet.yaml': fleet_text(plan), 'NEXT.md': first_page(plan)}
     files |= {f'{valve_name(tag)}.param.yaml': parameter_text(plan, tag) for tag in plan.tags}
     present = [name for name in files if (plan.folder / name).exists()]
@@ -171,15 +188,76 @@ def parser() -> argparse.ArgumentParser:
     return p
 
 
-def ask(question: str, default: str) -> str:
+def ask(question: str, default: str, check: Callable[[str], T]) -> T:
     """
-    Ask a person.
+    Ask a person, and again where the answer cannot be.
 
     :param question: what is asked.
     :param default: what an empty answer means.
-    :return: the answer.
+    :param check: makes a value of the answer; raises InitError.
+    :return: the value.
     """
-    return input(f'{question} [{default}]: ').strip() or default
+    while True:
+        try:
+            return check(input(f'{question} [{default}]: ').strip() or default)
+        except InitError as problem:
+            print(f'  {problem}')
+
+
+def tags_of(answer: str) -> tuple[str, ...]:
+    """
+    Read the tags of valves.
+
+    :param answer: tags with blanks or commas between.
+    :return: the tags.
+    :raises InitError: where one is no tag, or two give one name.
+    """
+    tags = tuple(answer.replace(',', ' ').split())
+    names_of(tags)
+    return tags
+
+
+def mode_of(answer: str) -> str:
+    """
+    Read a mode.
+
+    :param answer: as typed.
+    :return: the mode.
+    :raises InitError: where there is no such mode.
+    """
+    if answer not in MODES:
+        raise InitError(f'there is no mode {plain(answer, LONGEST)}: monitor or scada')
+    return answer
+
+
+def rate_of(answer: str) -> float:
+    """
+    Read a sample rate.
+
+    :param answer: as typed [Hz].
+    :return: the rate [Hz].
+    :raises InitError: where it is no rate.
+    """
+    try:
+        rate = float(answer.replace(',', '.'))
+    except ValueError:
+        rate = math.nan
+    if not 0.0 < rate <= MOST_RATE:
+        raise InitError(f'{plain(answer, LONGEST)} is no rate: give samples a second, more than 0')
+    return rate
+
+
+def yes_of(answer: str) -> bool:
+    """
+    Read yes or no.
+
+    :param answer: as typed.
+    :return: whether it is yes.
+    :raises InitError: where it is neither.
+    """
+    if answer.lower() not in ('y', 'yes', 'n', 'no'):
+        raise InitError('answer y or n')
+    return answer.lower().startswith('y')
 
 
 def main(args: list[str] | None = None) -> int:
@@ -190,27 +268,34 @@ def main(args: list[str] | None = None) -> int:
     :return: exit code.
     """
     options = parser().parse_args(split_ros_args(args)[0])
-    tags, mode = options.valve, options.mode
+    tags, mode, rate = options.valve, options.mode, options.rate
+    simulated = options.simulate
     try:
         if not tags:
             if not sys.stdin.isatty():
                 raise InitError('no valve is given: add --valve TAG')
-            tags = ask('Tags of the valves, with blanks between', 'LV-101').split()
-            mode = mode or ask('Mode: monitor (fast samples) or scada (one a second)', 'monitor')
+            tags = ask('Tags of the valves, with blanks between', 'LV-101', tags_of)
+            mode = mode or ask(
+                'Mode: monitor (50 samples a second or more) or scada (about one)',
+                'monitor',
+                mode_of,
+            )
+            rate = rate or ask('Samples a second', f'{RATES[mode]:g}', rate_of)
+            simulated = simulated or ask('Simulated plants to try it with (y, n)', 'n', yes_of)
         mode = mode or 'monitor'
-        if mode not in MODES:
-            raise InitError(f'there is no mode {mode}: monitor or scada')
-        rate = RATES[mode] if options.rate is None else options.rate
-        if not 0.0 < rate <= 10_000.0:
-            raise InitError(f'--rate {rate:g}: give samples a second, more than 0')
+        rate = RATES[mode] if rate is None else rate_of(f'{rate}')
         tags = tuple(plain(tag, LONGEST) for tag in tags)
-        written = write(Plan(options.folder, tags, mode, rate, options.simulate))
-    except (InitError, EOFError) as problem:
+        written = write(Plan(options.folder, tags, mode, rate, simulated))
+    except InitError as problem:
         print(f'init: {problem}', file=sys.stderr)
         return 2
+    except (EOFError, KeyboardInterrupt):
+        print('\ninit: nothing was written', file=sys.stderr)
+        return 130
     for path in written:
         print(path)
-    print(f'next: ros2 run damadics_bringup run {options.folder}/fleet.yaml --dashboard')
+    more = ' --simulate' if simulated else ''
+    print(f'next: ros2 run damadics_bringup run {written[0]} --dashboard{more}')
     return 0
 
 

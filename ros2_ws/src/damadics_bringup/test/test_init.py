@@ -42,6 +42,35 @@ def test_what_cannot_be_is_refused_with_a_remedy(tmp_path, words, said, capsys):
     assert not (tmp_path / 'plant').exists()
 
 
+def answer(monkeypatch, *words):
+    given = iter(words)
+    monkeypatch.setattr('sys.stdin.isatty', lambda: True)
+    monkeypatch.setattr('builtins.input', lambda _: next(given))
+
+
+def test_who_is_asked_may_err_and_is_told_what_to_start(tmp_path, capsys, monkeypatch):
+    answer(monkeypatch, '///', 'LV-101, LV-102', 'fast', '', 'many', '100', 'maybe', 'y')
+    assert main([str(tmp_path / 'plant')]) == 0
+    said = capsys.readouterr().out
+    for problem in ('is no tag', 'no mode fast', 'many is no rate', 'answer y or n'):
+        assert problem in said
+    valves = read_fleet(tmp_path / 'plant' / 'fleet.yaml')
+    assert [valve.name for valve in valves] == ['lv_101', 'lv_102']
+    assert all(valve.simulate['rate'] == 100.0 for valve in valves)
+    assert said.splitlines()[-1].endswith('fleet.yaml --dashboard --simulate')
+
+
+def test_who_stops_answering_gets_no_files(tmp_path, capsys, monkeypatch):
+    def leave(_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr('sys.stdin.isatty', lambda: True)
+    monkeypatch.setattr('builtins.input', leave)
+    assert main([str(tmp_path / 'plant')]) == 130
+    assert 'nothing was written' in capsys.readouterr().err
+    assert not (tmp_path / 'plant').exists()
+
+
 def test_files_of_before_are_not_overwritten(tmp_path, capsys):
     (tmp_path / 'fleet.yaml').write_text('mine')
     assert main([str(tmp_path), '--valve', 'LV-101']) == 2

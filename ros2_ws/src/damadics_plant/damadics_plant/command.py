@@ -232,7 +232,7 @@ def main(args: Sequence[str] | None = None) -> int:
         return _INTERRUPTED
     if not arguments.quiet:
         several = f'{len(jobs)} recordings in ' if len(jobs) > 1 else ''
-        print(f'{several}{arguments.out}')
+        print(f'written: {several}{arguments.out}')
     return 0
 
 

@@ -13,7 +13,8 @@ from damadics_dashboard.live.calls import Field, Service, ServiceError
 from damadics_dashboard.live.valve import Valve
 from damadics_dashboard.live.watcher import Watcher
 from damadics_dashboard.pages.elements import box, button, with_values
-from damadics_dashboard.pages.frame import grant, keep_user, user_name
+from damadics_dashboard.pages.frame import grant, keep_user, user_name, words
+from damadics_dashboard.words.answers import answer_words
 from damadics_dashboard.words.texts import Texts
 
 SHELVES = (600.0, 3600.0, 8 * 3600.0, 86400.0)
@@ -49,7 +50,7 @@ async def call(
         result=text,
     )
     ui.notify(
-        plain(text),
+        plain(answer_words(text, words().language)),
         type='positive' if done else 'negative',
         position='bottom-right',
         timeout=4000 if done else 9000,

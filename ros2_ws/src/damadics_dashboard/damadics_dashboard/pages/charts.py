@@ -63,7 +63,12 @@ def time_plot(
     second: Saved = {**axis, 'nameTextStyle': {'align': 'right'}, 'splitLine': {'show': False}}
     return {
         'animation': False,
-        'grid': {'left': 54, 'right': 46 if right else 30, 'top': 34, 'bottom': 40},
+        'grid': {
+            'left': 54,
+            'right': 46 if right else 30,
+            'top': 46 if right else 34,
+            'bottom': 40,
+        },
         'legend': {
             'top': 0,
             'right': 6,

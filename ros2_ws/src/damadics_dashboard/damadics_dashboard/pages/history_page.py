@@ -15,8 +15,13 @@ from damadics_dashboard.pages.frame import card, frame, grant, keep_user, may_op
 from damadics_dashboard.store.export import cell
 from damadics_dashboard.store.history import ACTION_COLUMNS, COLUMNS, Wanted
 from damadics_dashboard.store.rows import ActionRow
+from damadics_dashboard.words.answers import result_words
 from damadics_dashboard.words.texts import Texts
-from damadics_dashboard.words.valve_words import TRANSITIONS, address, history_rows
+from damadics_dashboard.words.valve_words import (
+    TRANSITIONS,
+    address,
+    history_rows,
+)
 
 DAYS = {0: 'all_time', 1: 'last_day', 7: 'last_week', 30: 'last_month', 365: 'last_year'}
 PAGE = 100  # rows
@@ -152,7 +157,7 @@ def _action(row: ActionRow, t: Texts) -> dict[str, str]:
         'what': t.entries.get(key, row['action']),
         'who': f'{row["user"] or t("nobody")}' + (f' ({role})' if role else ''),
         'comment': row['comment'] or '',
-        'result': ('' if row['done'] else f'{t("refused")}: ') + (row['result'] or ''),
+        'result': result_words(row, t),
     }
 
 

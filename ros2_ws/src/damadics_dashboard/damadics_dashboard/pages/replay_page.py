@@ -79,7 +79,7 @@ def replay_page(watcher: Watcher) -> None:
                 auto_upload=True,
                 max_file_size=LARGEST_UPLOAD,
                 label=t('replay_hint'),
-                on_rejected=lambda: ui.notify(t('too_large'), type='negative'),
+                on_rejected=lambda: ui.notify(t('not_taken'), type='negative'),
             ).props('flat')
             with_values(upload, accept=KINDS, aria_label=t('recording_to_replay'))
 
@@ -102,7 +102,7 @@ class _SettingsOfValve:
                 auto_upload=True,
                 max_file_size=LARGEST_SETTINGS,
                 label=t('settings_hint'),
-                on_rejected=lambda: ui.notify(t('too_large'), type='negative'),
+                on_rejected=lambda: ui.notify(t('settings_not_taken'), type='negative'),
             ).props('flat')
             with_values(upload, accept='.yaml,.yml', aria_label=t('settings_file'))
             self._upload = upload

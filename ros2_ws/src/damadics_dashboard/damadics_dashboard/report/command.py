@@ -3,14 +3,13 @@
 """Command `report`: one valve or the fleet over a period, as HTML, PDF and CSV."""
 
 import argparse
-import difflib
 import sys
 import time
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from damadics_fd.ros.arguments import command_parser, split_ros_args, state_folder
+from damadics_fd.ros.arguments import command_parser, split_ros_args, state_folder, suggestion
 from damadics_fd.store.file_names import file_name
 
 from damadics_dashboard.words.texts import LANGUAGES, Texts, texts, use_causes
@@ -130,8 +129,7 @@ def write(options: argparse.Namespace, since: float, until: float) -> list[Path]
                 of_tag = {tag: name for name, tag in history.tags().items()}
                 valve = of_tag.get(valve, valve)
             if valve not in known:
-                near = difflib.get_close_matches(options.what, known, 1)
-                hint = f'do you mean {near[0]}?' if near else f'known are {", ".join(known)}'
+                hint = suggestion(options.what, known) or f'known are {", ".join(known)}'
                 raise ValueError(f'nothing is known of {options.what}: {hint}')
             report = content.valve_report(sources, valve, since, until, t)
     finally:

@@ -12,9 +12,15 @@ from damadics_msgs.msg import FaultEvent
 from damadics_dashboard.report.signature import SignatureLines, signature_lines
 from damadics_dashboard.store.history import History, Wanted
 from damadics_dashboard.store.rows import ActionRow, EventRow
+from damadics_dashboard.words.answers import result_words
 from damadics_dashboard.words.outlook import outlook_words, value_words
 from damadics_dashboard.words.texts import Texts
-from damadics_dashboard.words.valve_words import TRANSITIONS, found_by, headline, history_rows
+from damadics_dashboard.words.valve_words import (
+    TRANSITIONS,
+    found_by,
+    headline,
+    history_rows,
+)
 
 DAY = 86400.0
 MOST_EVENTS = 5000
@@ -143,6 +149,7 @@ def valve_report(sources: Sources, valve: str, since: float, until: float, t: Te
         if len(found.start):
             limits = t.causes.limits.get(quantity, ())
             trends.append((t(f'trend_{quantity}'), quantity, found, tuple(limits)))
+    measured = max((len(x[2].start) * x[2].length for x in trends), default=0.0)
     rows = [
         [
             t(f'trend_{q}'),
@@ -174,7 +181,7 @@ def valve_report(sources: Sources, valve: str, since: float, until: float, t: Te
             (t('alarms'), str(len(alarms))),
             (t('mtbf'), t.duration(mtbf)),
             (t('mttr'), t.duration(mttr)),
-            (t('measured_intervals'), str(max((len(x[2].start) for x in trends), default=0))),
+            (t('measured_time'), t.duration(min(measured, until - since))),
         ],
         [line for line in summary if line],
         tables,
@@ -256,7 +263,7 @@ def _action(row: ActionRow, t: Texts) -> list[str]:
         t.entries.get(key, row['action']),
         row['user'] or t('nobody'),
         row['comment'] or '',
-        row['result'] or '',
+        result_words(row, t),
     ]
 
 

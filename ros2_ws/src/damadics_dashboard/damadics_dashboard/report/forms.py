@@ -5,6 +5,7 @@
 import csv
 import io
 import math
+import re
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
@@ -23,6 +24,7 @@ from damadics_dashboard.words.texts import Texts
 MOST_POINTS = 700  # of a drawn curve: more than the paper shows
 FLAT = 1e-3  # share of a value that is no change
 SMALLEST = 1e-9
+NUMBER = re.compile(r'([+-]?\d[\d.,]*( \S+){0,3}|–)?')  # with its unit
 TREND_COLUMNS = ('quantity', 'unit', 'time', 'length_s', *STATISTICS, 'reference')
 Pair = tuple[float, float]
 
@@ -49,7 +51,31 @@ def html(report: Report, t: Texts) -> str:
     :param t: the words.
     :return: HTML.
     """
-    return render('report.html', report=report, charts=charts_of(report), t=t, language=t.language)
+    return render(
+        'report.html',
+        report=report,
+        charts=charts_of(report),
+        numeric=numeric_columns,
+        t=t,
+        language=t.language,
+    )
+
+
+def numeric_columns(heads: list[str], rows: list[list[str]]) -> list[bool]:
+    """
+    Tell which columns of a table hold numbers, which stand one under the other.
+
+    :param heads: of its columns.
+    :param rows: its texts.
+    :return: a truth value for each column; the first one names the row.
+
+    >>> numeric_columns(['Valve', 'Peak', 'Finding'], [['lv101', '140 %', 'Friction is high.']])
+    [False, True, False]
+    """
+    return [
+        n > 0 and all(NUMBER.fullmatch(row[n]) for row in rows) and any(row[n] for row in rows)
+        for n in range(len(heads))
+    ]
 
 
 def text_csv(report: Report) -> str:

@@ -11,19 +11,22 @@ from fpdf.enums import TableCellFillMode, XPos, YPos
 from fpdf.fonts import FontFace
 
 from damadics_dashboard.report.content import Report
-from damadics_dashboard.report.forms import Chart, charts_of
+from damadics_dashboard.report.forms import Chart, charts_of, numeric_columns
 from damadics_dashboard.report.signature import SignatureLines
 from damadics_dashboard.words.texts import Texts
 
 INK, MUTED, LINE = (21, 32, 43), (86, 100, 115), (213, 221, 229)
 BLUE, RED, BAND = (10, 100, 189), (195, 38, 46), (206, 224, 244)
 Color = tuple[int, int, int]
-WIDTH, HEIGHT = 180.0, 34.0  # mm, of a chart
+WIDTH = 180.0  # mm, of what is written
+GAP = 8.0  # mm, between two charts side by side
+HEIGHT, MARGIN = 28.0, 13.0  # mm, of a chart, of its numbers on the left
 FONT = 'DejaVu'
 LONGEST_WORD = 60  # characters that fit on a line of a table
 ROOM = 28.0  # mm, of a heading and the first rows of its table
 PADDING = 3.0  # mm, of a cell of a table
-MOST_CHARTS = 3  # what is left of the first page
+MOST_CHARTS = 4  # what is left of the first page
+WHITE = (255, 255, 255)
 
 
 def pdf(report: Report, t: Texts) -> bytes:
@@ -46,8 +49,9 @@ def pdf(report: Report, t: Texts) -> bytes:
         paper.line_of(line, 12.0 if n == 0 else 10.0, INK if n < 2 else MUTED)
     if report.signature:
         paper.signature(report.signature, t)
-    for chart in charts_of(report)[:MOST_CHARTS]:
-        paper.chart(chart, t)
+    charts = charts_of(report)[:MOST_CHARTS]
+    for first in range(0, len(charts), 2):
+        paper.charts(charts[first : first + 2], t)
     for title, heads, rows in report.tables:
         if rows:
             paper.room(ROOM)
@@ -105,10 +109,11 @@ class _Paper(FPDF):
             headings_style=FontFace(emphasis='BOLD', color=MUTED),
             cell_fill_mode=TableCellFillMode.NONE,
         ) as table:
+            numbers = numeric_columns(heads, rows) if len(rows) > 1 else [False] * len(heads)
             for line in [heads, *rows]:
                 row = table.row()
-                for text in line:
-                    row.cell(_broken(str(text)))
+                for text, number in zip(line, numbers, strict=True):
+                    row.cell(_broken(str(text)), align='RIGHT' if number else 'LEFT')
 
     def _widths(self, columns: list[list[str]]) -> tuple[float, ...]:
         """Part the page among columns: no word is broken, the rest by how much there is to say."""
@@ -146,15 +151,27 @@ class _Paper(FPDF):
         if self.get_y() + height > self.page_break_trigger:
             self.add_page()
 
-    def chart(self, chart: Chart, t: Texts) -> None:
-        """Draw a trend: band of least and greatest, mean, limits."""
-        self.room(HEIGHT + 14.0)
-        self.heading(f'{chart.name} [{chart.unit}]', 9.0)
-        left, top = self.get_x() + 16.0, self.get_y() + 1.0
-        width = WIDTH - 16.0
+    def charts(self, charts: list[Chart], t: Texts) -> None:
+        """Draw trends side by side: band of least and greatest, mean, limits."""
+        self.room(HEIGHT + 16.0)
+        self.ln(2.5)
+        top = self.get_y()
+        for n, chart in enumerate(charts):
+            self._chart(chart, self.l_margin + n * (WIDTH + GAP) / 2.0, top, t)
+        self.set_xy(self.l_margin, top + HEIGHT + 10.0)
+
+    def _chart(self, chart: Chart, left: float, top: float, t: Texts) -> None:
+        self.set_font(FONT, 'B', 8.0)
+        self.set_text_color(*INK)
+        self.text(left + self.c_margin, top + 3.0, f'{chart.name} [{chart.unit}]')
+        width = (WIDTH - GAP) / 2.0 - MARGIN
+        left, top = left + MARGIN, top + 5.0
 
         def place(x: float, y: float) -> tuple[float, float]:
             return left + width * x, top + HEIGHT * (1.0 - y)
+
+        def write(right: float, y: float, text: str) -> None:
+            self.text(right - self.get_string_width(text), y, text)
 
         self.set_draw_color(*LINE)
         self.rect(left, top, width, HEIGHT)
@@ -163,12 +180,13 @@ class _Paper(FPDF):
         for share, value in chart.ticks:
             x, y = place(0.0, share)
             self.line(x, y, x + width, y)
-            self.text(left - 14.0, y + 1.0, t.number(value))
+            write(left - 1.5, y + 0.8, t.number(value))
         self.text(left, top + HEIGHT + 3.5, chart.first)
-        self.text(left + width - 12.0, top + HEIGHT + 3.5, chart.last)
+        write(left + width, top + HEIGHT + 3.5, chart.last)
         if len(chart.band) > 2:
             self.set_fill_color(*BAND)
             self.polygon([place(*p) for p in chart.band], style='F')
+            self.set_fill_color(*WHITE)  # else the tables that follow are filled too
         self.set_draw_color(*BLUE)
         self.set_line_width(0.35)
         if len(chart.mean) > 1:
@@ -180,7 +198,6 @@ class _Paper(FPDF):
             self.line(*place(0.0, share), *place(1.0, share))
         self.set_dash_pattern()
         self.set_line_width(0.2)
-        self.set_y(top + HEIGHT + 6.0)
 
 
 def _broken(text: str) -> str:

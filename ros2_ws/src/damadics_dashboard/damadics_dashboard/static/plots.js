@@ -4,6 +4,7 @@
 // shares zoom and cursor among the charts of a group. The charts themselves are Apache ECharts.
 
 (() => {
+  const UNSEEN = 3000; // ms between two drawings of a plot that nobody sees yet
   const DATED = 1e8; // s; smaller times count from the start of a simulation
   const STEPS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800,
     3600, 7200, 10800, 21600, 43200, 86400, 172800, 604800, 1209600, 2592000, 7776000, 31536000];
@@ -117,6 +118,7 @@
     if (!chart || !entry) return;
     if (entry.chart !== chart) {
       entry.chart = chart;
+      chart.getZr().setSleepAfterStill(1); // what stands still asks for no more frames
       style(id);
       if (entry.spec.group) {
         chart.group = entry.spec.group;
@@ -132,20 +134,31 @@
       place.hidden = !empty;
       place.textContent = entry.absent ? place.dataset.absent : place.dataset.empty;
     }
-    if (entry.hidden) { entry.late = true; return; }
+    if (!due(entry, empty)) { entry.late = true; return; }
+    entry.late = false;
+    entry.filled = !empty;
+    entry.drawn = performance.now();
     const option = { series: entry.data.map((points) => ({ data: points })) };
     if (entry.range && !entry.spec.xy) option.xAxis = axis(entry, chart);
     if (entry.areas) option.series[0].markArea = { data: entry.areas };
-    chart.setOption(option, { lazyUpdate: true });
+    chart.setOption(option);
+    // it has been drawn: no frame is needed until the next one (clouds are drawn in parts)
+    if (!entry.spec.xy) chart.getZr().animation.stop();
   }
 
-  // What is out of sight is not drawn until it comes into sight.
+  // What is in sight is drawn at once, what is within a screen of it now and then, what is
+  // further away when it comes near; so nobody scrolls to an empty plot.
+  const due = (entry, empty) => !document.hidden && (entry.seen !== false || (!entry.filled && !empty)
+    || (entry.near !== false && performance.now() - entry.drawn > UNSEEN));
+
   function watch(id, entry) {
     entry.watched = true;
-    new IntersectionObserver((seen) => {
-      entry.hidden = !seen[seen.length - 1].isIntersecting;
-      if (!entry.hidden && entry.late) { entry.late = false; draw(id); }
-    }, { rootMargin: '50px' }).observe(entry.chart.getDom());
+    const observe = (name, rootMargin) => new IntersectionObserver((places) => {
+      entry[name] = places[places.length - 1].isIntersecting;
+      if (entry[name] && entry.late) draw(id);
+    }, { rootMargin }).observe(entry.chart.getDom());
+    observe('seen', '50px');
+    observe('near', '100% 0px');
   }
 
   // The charts of a group show the same time: what one is zoomed to or points at, all are.
@@ -264,6 +277,9 @@
     theme = css('--ink') + css('--card');
     new MutationObserver(() => setTimeout(restyle, 30))
       .observe(document.body, { attributes: true, attributeFilter: ['class'] });
+    document.addEventListener('visibilitychange', () => charts.forEach((entry, id) => {
+      if (entry.late) draw(id);
+    }));
   };
   if (document.body) start(); else document.addEventListener('DOMContentLoaded', start);
 })();

@@ -58,8 +58,11 @@ def value_words(quantity: str, value: float, t: Texts) -> str:
     if not math.isfinite(value):
         return '–'
     factor, unit = UNITS[quantity]
-    sign = '+' if quantity in CHANGES else ''
-    return f'{t.local(f"{value * factor:{sign}.3g}")} {unit}'
+    value *= factor
+    if quantity in CHANGES:
+        value = round(value, 2)
+        return f'{t.local(f"{value:+.3g}" if value else "0")} {unit}'
+    return f'{t.local(f"{value:.3g}")} {unit}'
 
 
 def trend_of(found: Series) -> Trend | None:

@@ -248,6 +248,8 @@ def _row(row: EventRow, t: Texts) -> dict[str, Cell]:
         what, numbers, advice = headline(row, t)
     elif transition == FaultEvent.CLEARED and row['duration'] is not None:
         what = t('lasted', time=_lasting(row, t))
+    elif transition == FaultEvent.NEAR_MISS and row['ratio'] is not None:
+        what = t('near_miss_text', size=of_limit(row['ratio'], t))
     told = plain(row['text'] or '', SENTENCE)
     if faults_of(row['cause'] or ''):  # the sentence says how much is off
         advice = f'{told}. {advice}'

@@ -4,12 +4,12 @@
 
 import argparse
 from collections.abc import Sequence
-from difflib import get_close_matches
 
 import yaml
 
 from damadics_fd.core.record import Saved
 from damadics_fd.core.settings import Settings, SettingsError
+from damadics_fd.ros.arguments import suggestion
 
 
 def add_settings(parser: argparse.ArgumentParser, meaning: str) -> None:
@@ -83,6 +83,6 @@ def with_suggestions(error: SettingsError) -> str:
     problems = []
     for problem in error.problems:
         name, unknown, _ = problem.partition(': no such setting')
-        near = get_close_matches(name, known, 1) if unknown else []
-        problems.append(problem + (f': do you mean {near[0]}?' if near else ''))
+        hint = suggestion(name, known) if unknown else ''
+        problems.append(f'{problem}: {hint}' if hint else problem)
     return str(SettingsError(problems))

@@ -6,7 +6,6 @@ import argparse
 import signal
 import sys
 import time
-from difflib import get_close_matches
 from pathlib import Path
 
 import rclpy
@@ -20,7 +19,7 @@ from damadics_fd.bag.writing.bag_writer import BagWriter
 from damadics_fd.bag.writing.blackbox import BlackBox
 from damadics_fd.bag.writing.spool import Spool
 from damadics_fd.nodes.recorder import Recorder
-from damadics_fd.ros.arguments import command_parser
+from damadics_fd.ros.arguments import command_parser, suggestion
 from damadics_fd.ros.spin import spin_until
 
 QUIET = 0.02  # [s] without a message after which nothing is on its way any more
@@ -109,9 +108,9 @@ def main(args: list[str] | None = None) -> int:
         print(f'recorder: cannot write: {spool.error}', file=sys.stderr)
     silent = [name for name in node.wanted if not bag.counts.get(name)]
     for name in sorted(silent):
-        near = get_close_matches(name, seen, 1)
-        hint = f': do you mean {near[0]}?' if near else ''
-        print(f'recorder: no message came on {name}{hint}', file=sys.stderr)
+        hint = suggestion(name, seen)
+        said = f'recorder: no message came on {name}'
+        print(f'{said}: {hint}' if hint else said, file=sys.stderr)
     return int(bool(spool.dropped or spool.error))
 
 

@@ -3,13 +3,12 @@
 """Command `settings`: what can be set, its unit, its range and who reads it."""
 
 import argparse
-import difflib
 import json
 import sys
 
 from damadics_fd.core.modes import MODES
 from damadics_fd.core.settings.settings import Description, Settings
-from damadics_fd.ros.arguments import command_parser, split_ros_args
+from damadics_fd.ros.arguments import command_parser, split_ros_args, suggestion
 
 EXAMPLES = """examples:
   ros2 run damadics_fd settings --list
@@ -48,8 +47,7 @@ def main(args: list[str] | None = None) -> int:
     known = [row['name'] for row in rows]
     for name in options.names:
         if name not in known:
-            near = difflib.get_close_matches(name, known, 1)
-            hint = f'do you mean {near[0]}?' if near else 'settings --list shows all'
+            hint = suggestion(name, known) or 'settings --list shows all'
             print(f'settings: there is no setting {name}: {hint}', file=sys.stderr)
             return 2
     if not options.names and not options.list:

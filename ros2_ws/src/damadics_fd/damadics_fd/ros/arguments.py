@@ -5,7 +5,8 @@
 import argparse
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
 from pathlib import Path
 
 from damadics_fd.core.private import instead_of, writable
@@ -88,3 +89,21 @@ def split_ros_args(args: Sequence[str] | None) -> tuple[list[str], list[str]]:
     words = list(sys.argv[1:] if args is None else args)
     own = words.index('--ros-args') if '--ros-args' in words else len(words)
     return words[:own], words[own:]
+
+
+def suggestion(name: str, known: Iterable[str]) -> str:
+    """
+    Find the known name that is most like another.
+
+    :param name: as given.
+    :param known: the names that there are.
+    :return: `do you mean X?`, '' where nothing is like it.
+
+    >>> suggestion('tlearn', ['t_learn', 't_on']), suggestion('rate', ['k2', 'sample_rate'])
+    ('do you mean t_learn?', 'do you mean sample_rate?')
+    >>> suggestion('xyz', ['t_learn'])
+    ''
+    """
+    known = list(known)
+    near = get_close_matches(name, known, 1) or [k for k in known if name in k.split('_')]
+    return f'do you mean {near[0]}?' if near else ''

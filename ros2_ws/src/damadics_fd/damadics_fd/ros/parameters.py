@@ -3,7 +3,6 @@
 """Declare a node's parameters so that all mistakes in them are reported together."""
 
 from collections.abc import Iterable, Mapping
-from difflib import get_close_matches
 from typing import TypeVar
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
@@ -15,6 +14,7 @@ from damadics_fd.core.field import Given
 from damadics_fd.core.modes import MODES
 from damadics_fd.core.record import Plain, Saved
 from damadics_fd.core.settings import Settings, SettingsError, unread
+from damadics_fd.ros.arguments import suggestion
 from damadics_fd.ros.spin import UsageError
 
 T = TypeVar('T')
@@ -99,9 +99,9 @@ class Parameters:
         for name in self._given():
             if name in self._names or name.startswith(OF_EVERY_NODE):
                 continue
-            near = get_close_matches(name, self._names, 1)
-            hint = f': do you mean {near[0]}?' if near else ''
-            self._problems.append(f'{name}: there is no such parameter{hint}')
+            hint = suggestion(name, self._names)
+            said = f'{name}: there is no such parameter'
+            self._problems.append(f'{said}: {hint}' if hint else said)
         problems = [*self._problems, *more]
         if problems:
             name = self._node.get_name()

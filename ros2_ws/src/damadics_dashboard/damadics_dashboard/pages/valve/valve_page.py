@@ -10,6 +10,7 @@ from damadics_fd.core.stamps import SECOND as NANO
 from damadics_fd.core.text import NAME, plain
 from nicegui import ui
 
+from damadics_dashboard.live.traces import Points
 from damadics_dashboard.live.valve import Condition, Valve
 from damadics_dashboard.live.watcher import Watcher
 from damadics_dashboard.pages.actions import valve_buttons
@@ -96,6 +97,7 @@ class _Page:
         self._t = t
         self._second = 0
         self._paused = self._stale = False
+        self._clouds: tuple[Points, Points] | None = None  # goes with the curves: one drawing
         self._head(window)
         self._banner = markup('banner.html', kind='off', title='', detail='', figures=[])
         self._banner.classes('w-full')
@@ -166,10 +168,14 @@ class _Page:
     def _fast(self) -> None:
         if self._paused:
             return
-        news = self._feed.news()
-        if news is not None:
-            if residual := news.get(self._signals.residual.id):
-                residual['areas'] = self._areas()
+        news = self._feed.news() or {}
+        if residual := news.get(self._signals.residual.id):
+            residual['areas'] = self._areas()
+        if self._clouds is not None:
+            plot = self._signals.signature.id
+            news[plot] = {'all': True, 'from': [0, 0], 'series': self._clouds}
+            self._clouds = None
+        if news:
             tell('push', news)
 
     def _areas(self) -> list[Area]:
@@ -215,7 +221,7 @@ class _Page:
             if self._strokes is not None:
                 self._strokes.update()
             if not self._paused and (stale or valve.traces['estimate'].newest >= 0):
-                self._draw_signature()
+                self._clouds = signature(valve.traces['estimate'], SIGNATURE_NOW)
 
     def _banner_values(self, condition: Condition, now: float, clock: int) -> Banner:
         t, valve = self._t, self._valve
@@ -260,11 +266,6 @@ class _Page:
             heads=[t(k) for k in ('time', 'class', 'what', 'alarm', 'peak', 'text')],
             named=False,
         )
-
-    def _draw_signature(self) -> None:
-        clouds = signature(self._valve.traces['estimate'], SIGNATURE_NOW)
-        plot = self._signals.signature.id
-        tell('push', {plot: {'all': True, 'from': [0, 0], 'series': clouds}})
 
 
 def _figure(
