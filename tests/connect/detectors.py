@@ -1,8 +1,14 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""A detector of the test: publishes flags and events as the real one does, serves its services."""
+"""
+A detector of the test: publishes flags and events as the real one does, serves its services.
+
+As a program, `detectors.py VALVE ...`, it judges what it is told: "raised VALVE", "cleared VALVE".
+"""
 
 import atexit
+import os
+import sys
 import threading
 import time
 
@@ -115,3 +121,10 @@ class Detectors:
             return response
 
         self.node.create_service(kind, f'/{valve}/{name}', answer)
+
+
+if __name__ == '__main__':
+    told = Detectors(int(os.environ['ROS_DOMAIN_ID']), *sys.argv[1:])
+    for line in sys.stdin:
+        transition, name = line.split()
+        told.judge(name, getattr(FaultEvent, transition.upper()), f'{transition} {name}')

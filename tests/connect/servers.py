@@ -39,6 +39,18 @@ def listens(port: int) -> bool:
         return probe.connect_ex(('127.0.0.1', port)) == 0
 
 
+def namespaces() -> bool:
+    """Tell whether a network of one's own may be made."""
+    if not (shutil.which('unshare') and shutil.which('ip')):
+        return False
+    return subprocess.run(['unshare', '-rn', 'true'], capture_output=True).returncode == 0
+
+
+needs_namespace = pytest.mark.skipif(
+    not namespaces(), reason='network namespaces are not allowed here'
+)
+
+
 class Server:
     """A server as a process that can be killed, held and started again."""
 

@@ -236,8 +236,11 @@ def test_who_was_dropped_with_nothing_to_publish_comes_back(processes, domain, t
     start(processes, tmp_path, config)
     reader = Program(broker.port, 'fd/status')
     assert wait_for(lambda: reader.of('fd/status')[-1:] == [b'monitored'], 30.0)
-    heard, joined = len(reader.got), reader.joined
+    again = wait_for(lambda: reader.of('fd/status').count(b'monitored') >= 4)
+    assert again, 'who hears nothing for two seconds may take it for gone'
+    joined = reader.joined
     broker.kill()
+    heard = len(reader.got)
     broker.start()
     assert wait_for(lambda: reader.joined > joined, 30.0)
     assert wait_for(lambda: len(reader.got) > heard, 30.0), 'it has said again that it is there'

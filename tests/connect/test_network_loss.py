@@ -4,13 +4,13 @@
 
 import os
 import re
-import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 import yaml
+from connect.servers import needs_namespace
 from damadics_bringup.processes import executable
 
 pytestmark = pytest.mark.ros
@@ -51,17 +51,6 @@ n=$(grep -c sample listener.log)
 until [ "$(grep -c sample listener.log)" -ge $((n + 6)) ]; do sleep 0.2; done
 kill $listener $device $broker
 """
-
-
-def allowed() -> bool:
-    if not (shutil.which('unshare') and shutil.which('ip')):
-        return False
-    return subprocess.run(['unshare', '-rn', 'true'], capture_output=True).returncode == 0
-
-
-needs_namespace = pytest.mark.skipif(
-    not allowed(), reason='network namespaces are not allowed here'
-)
 
 
 @needs_namespace

@@ -6,9 +6,9 @@ import os
 from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 from pathlib import Path
-from urllib.parse import urlsplit
 
 import yaml
+from damadics_fd.store.access import Access, AccessError, read_access
 from damadics_fd.store.yaml_text import read_yaml
 
 LARGEST = 20_000_000  # bytes of a configuration: thousands of valves
@@ -38,21 +38,6 @@ class Secret:
         return '...' if self._value else "''"
 
     __str__ = __repr__
-
-
-def shown(url: str) -> str:
-    """
-    Return an address without the secrets in it.
-
-    :param url: an address, perhaps with user, password or a query.
-    :return: scheme, host, port and path.
-
-    >>> shown('mqtt://me:secret@plant:1883/x?token=abc')
-    'mqtt://plant:1883/x'
-    """
-    parts = urlsplit(url)
-    host = parts.netloc.rpartition('@')[2]
-    return f'{parts.scheme}://{host}{parts.path}' if parts.scheme else parts.path
 
 
 class Section:
@@ -132,14 +117,28 @@ class Section:
             return default
         return value
 
-    def path(self, name: str, *, must_exist: bool = True) -> Path | None:
-        """Read a path, relative to the configuration's folder."""
+    def path(self, name: str, *, must_exist: bool = True, secret: bool = False) -> Path | None:
+        """
+        Read a path, relative to the configuration's folder.
+
+        :param name: of the entry.
+        :param must_exist: a file or folder has to be there.
+        :param secret: of a file with a secret in it: what stands here may be the secret itself.
+        :return: None where the entry is missing.
+        """
         value = self.text(name)
         if not value:
             return None
-        path = self.folder / Path(value).expanduser()
-        if must_exist and not path.exists():
-            self.problems.append(f'{self._at(name)}: {path} does not exist')
+        shown_as = f'this file, in {self.folder},' if secret else ''
+        try:
+            path = self.folder / Path(value).expanduser()
+            there = path.exists()
+        except (OSError, ValueError, RuntimeError) as problem:
+            why = getattr(problem, 'strerror', None) or 'is no path'
+            self.problems.append(f'{self._at(name)}: {shown_as or "this"}: {why}')
+            return None
+        if must_exist and not there:
+            self.problems.append(f'{self._at(name)}: {shown_as or path} does not exist')
         return path
 
     def texts(self, name: str) -> list[str]:
@@ -193,19 +192,37 @@ class Section:
         """
         if self._take(name) is not None:
             self.refuse(name, f'stands in the file: give {name}_file or {name}_env instead')
-        file, variable = self.path(f'{name}_file'), self.text(f'{name}_env')
-        if file is not None and file.is_file():
+        file = self.path(f'{name}_file', secret=True)
+        variable = self.text(f'{name}_env')
+        if file is not None and file.exists():
+            where = f'{self._at(name)}_file: {file}'
             try:
                 secret = Secret(file.read_text().strip())
-            except (OSError, UnicodeDecodeError) as problem:
-                self.problems.append(f'{self._at(name)}_file: {file} cannot be read: {problem}')
+            except OSError as problem:
+                self.problems.append(f'{where} cannot be read: {problem.strerror}')
+                return Secret()
+            except UnicodeDecodeError:
+                self.problems.append(f'{where} is not a text file')
                 return Secret()
             if not secret:
-                self.problems.append(f'{self._at(name)}_file: {file} is empty')
+                self.problems.append(f'{where} is empty')
             return secret
         if variable and not os.environ.get(variable):
-            self.problems.append(f'{self._at(name)}_env: {variable} is not set')
+            self.problems.append(
+                f'{self._at(name)}_env: there is no such variable, or it is empty'
+            )
         return Secret(os.environ.get(variable, '') if variable else '')
+
+    def tokens(self) -> Access:
+        """Read `token_file`: who may enter; open to everybody only where the entry is missing."""
+        path = self.path('token_file', secret=True)
+        if path is None or not path.exists():
+            return Access()
+        try:
+            return read_access(path)
+        except AccessError as problem:
+            self.problems.append(f'{self._at("token_file")}: {problem}')
+            return Access()
 
     def refuse(self, name: str, why: str) -> None:
         """Note a mistake in an entry; the value itself is not shown."""

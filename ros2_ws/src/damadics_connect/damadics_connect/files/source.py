@@ -25,6 +25,7 @@ LOOK = 0.1  # s between two looks at the files
 AT_ONCE = 2000  # rows before others have their turn
 UNITS = {'s': NANO, 'ms': 1_000_000, 'us': 1000, 'ns': 1}
 LATEST = 2**62  # ns
+DISORDER = 60 * NANO  # ns by which rows of several writers may be out of order
 
 
 class Stamps:
@@ -46,7 +47,8 @@ class Stamps:
         """
         Return the stamp of a row [ns].
 
-        The hour that the end of daylight saving repeats is told apart by the order of the rows.
+        The hour that the end of daylight saving repeats is told apart by the order of the rows,
+        in the first one by our own clock.
 
         :raises ValueError: where there is none.
         """
@@ -76,9 +78,16 @@ class Stamps:
             if self._zone is None:
                 raise ValueError(f'{self.column} has no time zone: give stamp.zone')
             when = when.replace(tzinfo=self._zone)
-            if _ns(when) <= self._last < _ns(when.replace(fold=1)):
-                when = when.replace(fold=1)
+            first, second = _ns(when), _ns(when.replace(fold=1))
+            if first != second and self._is_second(first, second):
+                return second
         return _ns(when)
+
+    def _is_second(self, first: int, second: int) -> bool:
+        """Tell which of its two instants a time in the hour is that comes twice."""
+        if not self._last:
+            return 0 <= time.time_ns() - second < second - first  # it has been written just now
+        return first + DISORDER < self._last < 2 * second - first
 
 
 def _ns(when: datetime) -> int:

@@ -5,7 +5,7 @@
 import ipaddress
 from urllib.parse import urlsplit
 
-from damadics_fd.store.access import Access, AccessError, Grant, Role, read_access
+from damadics_fd.store.access import Access, Grant, Role
 from fastapi import HTTPException, Request
 
 from damadics_connect.settings import Section
@@ -103,13 +103,7 @@ def read_guard(config: Section, host: str) -> Guard:
     :param host: that is served.
     :return: the guard; mistakes are noted in `config`.
     """
-    path = config.path('token_file')
-    access = Access()
-    if path is not None and path.is_file():
-        try:
-            access = read_access(path)
-        except AccessError as problem:
-            config.problems.append(f'token_file: {problem}')
-    elif not loopback(host):
+    access = config.tokens()
+    if 'token_file' not in config and not loopback(host):
         config.refuse('host', 'opens this to the network: give a token_file (see --help)')
     return Guard(access)

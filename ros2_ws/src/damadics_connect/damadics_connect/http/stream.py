@@ -5,6 +5,7 @@
 import asyncio
 import contextlib
 import json
+import time
 from collections import deque
 from collections.abc import AsyncIterator
 
@@ -26,7 +27,8 @@ class Stream:
 
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         self._loop = loop
-        self._number = 0
+        # beyond all that a process of before has given out: who was there goes on, and misses none
+        self._number = time.time_ns() // 1_000_000
         self._kept: deque[Message] = deque(maxlen=KEPT)
         self._listeners: set[asyncio.Queue[Message | None]] = set()
 
@@ -52,6 +54,8 @@ class Stream:
         :return: an endless iterator; a comment every second says that the connection lives.
         """
         queue: asyncio.Queue[Message | None] = asyncio.Queue(WAITING)
+        if after is not None and after > self._number:
+            after = 0  # of a process of before, whose clock was ahead
         missed = [m for m in self._kept if m[0] > after] if after is not None else []
         self._listeners.add(queue)
         try:

@@ -12,6 +12,7 @@ from urllib.parse import urlsplit
 from aiomqtt import Client, Will
 from aiomqtt.exceptions import MqttConnectError
 
+from damadics_connect.addresses import address_problem
 from damadics_connect.settings import Secret, Section
 from damadics_connect.source_clock import NANO
 
@@ -108,16 +109,11 @@ def read_broker(config: Section) -> Broker:
     :return: the broker; mistakes are noted in `config`.
     """
     url = config.needed('broker', 'mqtt://broker.example:1883')
+    if url and (problem := address_problem(url, *SCHEMES)):
+        config.refuse('broker', problem)
+        url = ''
     parts = urlsplit(url)
-    if url and parts.scheme not in SCHEMES:
-        config.refuse('broker', 'does not begin with mqtt:// or mqtts://')
-    if '@' in parts.netloc:
-        config.refuse('broker', 'has a user in it: give user.name and user.password_file')
-    try:
-        port = parts.port or SCHEMES.get(parts.scheme, 1883)
-    except ValueError:
-        config.refuse('broker', 'has no valid port')
-        port = 1883
+    port = parts.port or SCHEMES.get(parts.scheme, 1883)
     user = config.section('user')
     tls = config.section('tls')
     broker = Broker(

@@ -12,47 +12,14 @@ from aiomqtt import Client, Message, MqttError
 from damadics_fd.core.sample import SIGNALS
 from damadics_fd.ros.diagnostics import Report
 
-from damadics_connect.health import report
-from damadics_connect.joining import Joiner
+from damadics_connect.health import report, some
 from damadics_connect.mqtt.broker import PAUSES, QUIET, Broker, Pulse, why
-from damadics_connect.mqtt.json_sample import (
-    LATEST,
-    UNITS,
-    field_at,
-    limited,
-    number_or_word,
-    parsed,
-    stamp_of,
-)
-from damadics_connect.mqtt.sparkplug import (
-    NAMESPACE,
-    REBIRTH,
-    number_of,
-    read_payload,
-    write_payload,
-)
+from damadics_connect.mqtt.devices import Devices
+from damadics_connect.mqtt.followed_valve import FollowedValve
+from damadics_connect.mqtt.json_sample import field_at, number_or_word, parsed, stamp_of
+from damadics_connect.mqtt.sparkplug import NAMESPACE
 from damadics_connect.publishing import Output
-from damadics_connect.source_clock import NANO
 from damadics_connect.valve_list import ValveSource
-
-AGAIN = 5.0  # s between two requests for a birth certificate
-
-
-class Valve:
-    """One valve: its joiner and what its messages are called."""
-
-    def __init__(self, source: ValveSource, emit: Callable[[int, list[float]], None]) -> None:
-        self.source = source
-        self.joiner = Joiner(
-            int(source.period * NANO),
-            int(0.3 * source.period * NANO),
-            tuple(signal.slot for signal in source.signals),
-            emit,
-        )
-        self.fields = {signal.source: signal for signal in source.signals}
-        self.aliases: dict[int, str] = {}
-        self.alive = False
-        self.refused = ''
 
 
 class Incoming:
@@ -78,16 +45,15 @@ class Incoming:
         self._stamp = stamp
         self._output = output
         self._log = log
-        self._valves: dict[str, list[Valve]] = {}
-        self._all: dict[str, Valve] = {}
+        self._valves: dict[str, list[FollowedValve]] = {}
+        self._all: dict[str, FollowedValve] = {}
         for number, source in enumerate(valves):
-            valve = Valve(source, partial(output.send, number))
+            valve = FollowedValve(source, partial(output.send, number))
             self._all[source.name] = valve
             self._valves.setdefault(source.place, []).append(valve)
-        self._sequence: dict[str, int] = {}
-        self._asked: dict[str, float] = {}
+        self._devices = Devices(self._valves)
         self._fault = 'not connected yet'
-        self._messages = self._unstamped = 0
+        self._messages = 0
 
     async def run(self) -> None:
         """Follow the broker for ever."""
@@ -102,8 +68,7 @@ class Incoming:
                 if reason != self._fault:
                     self._log(f'not connected: {reason}')
                 self._fault = reason
-            for valve in self._all.values():
-                valve.alive = False
+            self._devices.end()
             await asyncio.sleep(PAUSES[min(failures, len(PAUSES) - 1)])
             failures += 1
 
@@ -111,13 +76,17 @@ class Incoming:
         """Say how the broker and the valves are."""
         refused = [f'{n}: {v.refused}' for n, v in self._all.items() if v.refused]
         problems = [f'messages refused: {"; ".join(refused[:5])}'] if refused else []
-        if self._unstamped:
-            problems.append(f'no {self._stamp[0]} in messages: the time of arrival is taken')
+        if unstamped := [name for name, valve in self._all.items() if valve.unstamped]:
+            problems.append(f'no time in messages, that of arrival is taken: {some(unstamped)}')
         return report(
             self._fault,
             {name: valve.joiner for name, valve in self._all.items()},
             self._output,
-            {'Broker': self._broker.shown, 'Messages': self._messages},
+            {
+                'Broker': self._broker.shown,
+                'Messages': self._messages,
+                'Messages lost by edge nodes': self._devices.lost,
+            },
             problems,
             time.monotonic_ns(),
         )
@@ -126,31 +95,17 @@ class Incoming:
         now = time.monotonic_ns()
         for valve in self._all.values():
             valve.joiner.begin(now)
-        self._sequence.clear()
-        topics, edges = set(), set()
-        for topic in self._valves:
-            space, *parts = topic.split('/')
-            if space == NAMESPACE:
-                group, node, device = parts
-                edges.add((group, node))
-                topics |= {
-                    f'{NAMESPACE}/{group}/+/{node}/{device}',
-                    f'{NAMESPACE}/{group}/+/{node}',
-                }
-            else:
-                topics.add(topic)
-        for topic in sorted(topics):
+        self._devices.begin()
+        topics = {topic for topic in self._valves if not topic.startswith(f'{NAMESPACE}/')}
+        for topic in sorted(topics | self._devices.topics()):
             await client.subscribe(topic, qos=1)
         self._fault = ''
         self._log(f'connected to {self._broker.shown}: {len(self._all)} valve(s)')
-        self._asked.clear()
-        for group, node in sorted(edges):  # a device at rest says nothing by itself
-            await self._ask_for_birth(client, group, node)
-        self._asked.clear()  # whoever was not there to hear it is asked once more
+        await self._devices.ask(client, at_first=True)
         pulse = Pulse()
         jobs = [
             asyncio.create_task(job)
-            for job in (self._take(client), pulse.keep(client), self._hold(pulse))
+            for job in (self._take(client), pulse.keep(client), self._hold(client, pulse))
         ]
         try:
             done, _ = await asyncio.wait(jobs, return_when=asyncio.FIRST_COMPLETED)
@@ -166,12 +121,13 @@ class Incoming:
         async for message in client.messages:
             self._messages += 1
             if str(message.topic).startswith(f'{NAMESPACE}/'):
-                await self._take_sparkplug(client, message)
+                self._devices.take(message)
+                await self._devices.ask(client)
             else:
                 self._take_json(message)
             self._output.flush()
 
-    async def _hold(self, pulse: Pulse) -> None:
+    async def _hold(self, client: Client, pulse: Pulse) -> None:
         """
         Hold what does not change, for devices that tell when they die.
 
@@ -181,6 +137,7 @@ class Incoming:
         while True:
             await asyncio.sleep(0.05)
             self._tell_silence(pulse.silent)
+            await self._devices.ask(client)
             now = time.monotonic_ns()
             for valve in self._all.values():
                 if valve.alive:
@@ -205,7 +162,7 @@ class Incoming:
         for valve in self._valves.get(str(message.topic), ()):
             try:
                 content = parsed(message.payload)
-                stamp = self._stamp_of(content)
+                stamp = self._stamp_of(valve, content)
                 values = {name: number_or_word(field_at(content, name)) for name in valve.fields}
             except ValueError as problem:
                 if valve.refused != str(problem):
@@ -223,73 +180,10 @@ class Incoming:
                     tally.bad.pop(key, None)
                 valve.joiner.take(signal.slot, stamp, signal.scale(value), now)
 
-    def _stamp_of(self, content: dict[str, object]) -> int:
+    def _stamp_of(self, valve: FollowedValve, content: dict[str, object]) -> int:
         field, unit = self._stamp
         given = field_at(content, field)
         if given is None:
-            self._unstamped += 1
+            valve.unstamped += 1
             return time.time_ns()
         return stamp_of(given, field, unit)
-
-    async def _take_sparkplug(self, client: Client, message: Message) -> None:
-        """Take one message of an edge node or one of its devices."""
-        _, group, kind, node, *device = str(message.topic).split('/')
-        edge = f'{NAMESPACE}/{group}/{node}'
-        valves = self._valves.get(f'{edge}/{device[0]}', []) if device else []
-        if kind == 'NDEATH' or (kind == 'DDEATH' and device):
-            for topic, those in self._valves.items():
-                if topic.startswith(f'{edge}/') and (not device or those is valves):
-                    for valve in those:
-                        valve.alive = False
-                        valve.aliases.clear()
-            return
-        if kind not in ('NBIRTH', 'DBIRTH', 'NDATA', 'DDATA'):
-            return
-        try:
-            payload = read_payload(limited(message.payload))
-        except ValueError as problem:
-            for valve in valves:
-                valve.refused = str(problem)
-            return
-        last = self._sequence.get(edge)
-        self._sequence[edge] = payload.seq
-        lost = kind[1:] == 'DATA' and last is not None and payload.seq != (last + 1) % 256
-        now = time.monotonic_ns()
-        for valve in valves:
-            valve.refused = ''
-            if kind == 'DBIRTH':
-                valve.aliases = {m.alias: m.name for m in payload.metrics if m.HasField('alias')}
-                valve.joiner.begin(now)
-                valve.alive = True
-            lost |= not valve.alive
-            self._take_metrics(valve, payload, now)
-        if lost:
-            await self._ask_for_birth(client, group, node)
-
-    def _take_metrics(self, valve: Valve, payload, now: int) -> None:  # type: ignore[no-untyped-def]
-        rows = []
-        for metric in payload.metrics:
-            name = metric.name or valve.aliases.get(metric.alias, '')
-            if metric.is_historical or name not in valve.fields:
-                continue
-            stamp = (metric.timestamp or payload.timestamp) * UNITS['ms']
-            if 0 < stamp < LATEST:
-                rows.append((stamp, name, number_of(metric)))
-        for stamp, name, value in sorted(rows, key=lambda row: row[0]):
-            signal = valve.fields[name]
-            key = SIGNALS[signal.slot]
-            if math.isnan(value):
-                valve.joiner.tally.bad[key] = 'null, of bad quality or no number'
-            else:
-                valve.joiner.tally.bad.pop(key, None)
-            valve.joiner.source_clock(payload.timestamp * UNITS['ms'] or stamp, now)
-            valve.joiner.take(signal.slot, stamp, signal.scale(value), now)
-
-    async def _ask_for_birth(self, client: Client, group: str, node: str) -> None:
-        """Ask an edge node for its names and values, as we have missed them."""
-        key, now = f'{group}/{node}', time.monotonic()
-        if now - self._asked.get(key, -math.inf) < AGAIN:
-            return
-        self._asked[key] = now
-        request = write_payload({REBIRTH: True}, time.time_ns() // UNITS['ms'], None)
-        await client.publish(f'{NAMESPACE}/{group}/NCMD/{node}', request, qos=0)

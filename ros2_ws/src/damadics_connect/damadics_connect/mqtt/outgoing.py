@@ -3,14 +3,16 @@
 """
 Judgements out, to the topics of a broker.
 
-`PREFIX/status` says `monitored` while we are connected; it is retained, and the broker itself
-turns it to `not_monitored` when it loses us. `PREFIX/VALVE/state` is retained: the present
-judgement. `PREFIX/VALVE/event` carries each transition in order, also those of a time without a
-broker.
+`PREFIX/status` says `monitored` once a second while we are connected; it is retained, and the
+broker itself turns it to `not_monitored` when it loses us. A broker whose network is gone notices
+that after many seconds, and one that went down together with us never: a status that is not said
+again for two seconds counts no more. `PREFIX/VALVE/state` is retained: the present judgement.
+`PREFIX/VALVE/event` carries each transition in order, also those of a time without a broker.
 """
 
 import asyncio
 import json
+import time
 from collections import deque
 from collections.abc import Callable
 
@@ -70,7 +72,6 @@ class Outgoing:
             try:
                 async with self._broker.client(will) as client:
                     failures = 0
-                    await client.publish(status, PRESENT, qos=1, retain=True)
                     self._changed.update(self._valves)
                     self.connected, self.fault = True, ''
                     self._log(f'publishing to {self._broker.shown}: {self._prefix}/...')
@@ -93,9 +94,13 @@ class Outgoing:
             failures += 1
 
     async def _publish(self, client: Client, pulse: asyncio.Task[None]) -> None:
+        due = 0.0
         while True:
             if pulse.done():
                 pulse.result()  # the broker has dropped us, though there was nothing to publish
+            if (now := time.monotonic()) >= due:
+                due = now + REPEAT
+                await client.publish(f'{self._prefix}/status', PRESENT, qos=1, retain=True)
             while self._events:
                 event = self._events[0]
                 topic = f'{self._prefix}/{event.valve}/event'

@@ -20,6 +20,7 @@ FLOAT, DOUBLE, BOOLEAN, STRING, DATETIME, TEXT = range(9, 15)
 SIGNED = {INT8: 8, INT16: 16, INT32: 32, INT64: 64}
 GOOD = 192  # of the property Quality
 REBIRTH = 'Node Control/Rebirth'
+BIRTH = 'bdSeq'
 _F = descriptor_pb2.FieldDescriptorProto
 _PACKAGE = 'org.eclipse.tahu.protobuf'
 _VALUES = (
@@ -151,6 +152,19 @@ def number_of(metric: Message) -> float:
         if value >= 0:
             return math.nan
     return float(value)
+
+
+def birth_of(payload: Message) -> int | None:
+    """
+    Return the number that a birth of an edge node and the death that belongs to it share.
+
+    :param payload: of either.
+    :return: None where there is none.
+    """
+    for metric in payload.metrics:
+        if metric.name == BIRTH and not math.isnan(number := number_of(metric)):
+            return int(number)
+    return None
 
 
 def _quality(metric: Message) -> int:

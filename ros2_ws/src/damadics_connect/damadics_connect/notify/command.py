@@ -28,7 +28,7 @@ with notify.yaml:
     - {to: [chat], valves: ['lv1*'], from: '06:00', until: '22:00', digest: 300}"""
 MISSING = 'apprise is not installed: make env'
 OLD = 600.0  # s: transitions before the very first start are told only if they are newer
-LIBRARIES = ('apprise',)
+LIBRARIES = ('apprise', 'urllib3', 'requests', 'asyncio')
 
 
 def parser() -> argparse.ArgumentParser:

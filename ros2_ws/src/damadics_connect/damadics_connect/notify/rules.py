@@ -229,7 +229,8 @@ def _some(
     given = tuple(entry.texts(name))
     for each in given:
         if each not in allowed:
-            entry.refuse(name, f'{each[:30]!r} is not one of {", ".join(allowed)}')
+            word = 'an address' if ':' in each else repr(each[:30])  # the former has secrets
+            entry.refuse(name, f'{word} is not one of {", ".join(allowed)}')
     return given or default
 
 

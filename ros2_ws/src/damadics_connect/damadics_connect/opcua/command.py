@@ -10,8 +10,9 @@ from pathlib import Path
 
 from damadics_fd.ros.arguments import command_parser, split_ros_args, state_folder
 
+from damadics_connect.addresses import address_problem
 from damadics_connect.process import ConnectError, Graph, run
-from damadics_connect.settings import check, read_config
+from damadics_connect.settings import ConfigError, check, read_config
 
 EXAMPLES = """examples:
   ros2 run damadics_connect opcua --browse opc.tcp://plc:4840 > plant.yaml
@@ -122,9 +123,14 @@ async def browse(url: str, path: Path | None) -> int:
         read_endpoint,
     )
 
+    if problem := address_problem(url, 'opc.tcp'):
+        raise ConnectError(f'--browse: the address {problem} (in a CONFIG.yaml after it)')
     endpoint = Endpoint(url)
     if path is not None:
-        endpoint = read_endpoint(read_config(path))._replace(url=url)
+        config = read_config(path)
+        endpoint = read_endpoint(config)._replace(url=url)
+        if config.problems:
+            raise ConfigError('\n  '.join([f'{path}:', *config.problems]))
     try:
         client = await open_session(endpoint)
         try:

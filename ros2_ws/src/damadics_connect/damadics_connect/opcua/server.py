@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from asyncua import Server, ua
 from damadics_fd.ros import qos
-from damadics_fd.store.access import Access, AccessError, read_access
+from damadics_fd.store.access import Access
 from damadics_msgs.msg import OperatorAction, Signature
 from rclpy.node import Node as RosNode
 
@@ -53,13 +53,7 @@ def read_serve(config: Section) -> ServeSettings | None:
     endpoint = serve.text('endpoint', 'opc.tcp://127.0.0.1:4841')
     if not endpoint.startswith('opc.tcp://'):
         serve.refuse('endpoint', 'does not begin with opc.tcp://')
-    access = Access()
-    tokens = serve.path('token_file')
-    if tokens is not None and tokens.is_file():
-        try:
-            access = read_access(tokens)
-        except AccessError as problem:
-            serve.problems.append(f'serve.token_file: {problem}')
+    access = serve.tokens()
     nodesets = tuple(serve.folder / Path(name).expanduser() for name in serve.texts('nodesets'))
     for path in nodesets:
         if not path.is_file():

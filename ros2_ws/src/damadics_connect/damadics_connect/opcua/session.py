@@ -11,7 +11,8 @@ from typing import NamedTuple
 from asyncua import Client, ua
 from asyncua.crypto import security_policies
 
-from damadics_connect.settings import Secret, Section, shown
+from damadics_connect.addresses import address_problem, shown
+from damadics_connect.settings import Secret, Section
 
 POLICIES = ('Basic256Sha256', 'Aes128Sha256RsaOaep', 'Aes256Sha256RsaPss')
 MODES = ('Sign', 'SignAndEncrypt')
@@ -69,10 +70,8 @@ def read_endpoint(config: Section) -> Endpoint:
     :return: the endpoint; mistakes are noted in `config`.
     """
     url = config.needed('server', 'opc.tcp://plc.example:4840')
-    if url and not url.startswith('opc.tcp://'):
-        config.refuse('server', 'does not begin with opc.tcp://')
-    if '@' in url:
-        config.refuse('server', 'has a user in it: give user.name and user.password_file')
+    if url and (problem := address_problem(url, 'opc.tcp')):
+        config.refuse('server', problem)
     user = config.section('user')
     name = user.text('name')
     password = user.secret('password')
