@@ -12,7 +12,7 @@ from damadics_dashboard.live.overview import Overview
 from damadics_dashboard.live.valve import Valve
 from damadics_dashboard.pages.fleet_page import Tiles
 from damadics_dashboard.words.texts import texts
-from damadics_msgs.msg import FaultFlag
+from damadics_msgs.msg import FaultFlag, OperatorAction
 
 
 @pytest.fixture
@@ -76,3 +76,22 @@ def test_a_status_with_odd_numbers_breaks_no_tile(fleet_of_200):
     kinds = {name: tile['kind'] for name, tile in told['tiles'].items() if tile['kind'] != 'ok'}
     assert kinds == {'unit9/v0009': 'off'}, 'nobody has told of the valve whose number is none'
     assert min(columns['shares']) == -1
+
+
+def test_strokes_of_a_valve_of_a_fleet_are_booked_to_it_and_known_while_they_last(fleet_of_200):
+    valves, *_ = fleet_of_200
+    report = FleetReport(lambda name: valves[name], '/fleet', valves.get)
+    booked = []
+    for result in (
+        '/unit7/v0007: 5 partial strokes were made',
+        'done for 2 of 2 valves',
+        '/elsewhere: 5 partial strokes were made',
+    ):
+        action = OperatorAction(action=OperatorAction.PARTIAL_STROKE, success=True, result=result)
+        report.take_action(action, lambda name, told: booked.append((name, told.result)))
+    assert booked == [('unit7/v0007', '5 partial strokes were made')]
+    valve = valves['unit7/v0007']
+    report.take_diagnostics({'Partial strokes under way': '/unit7/v0007, /elsewhere'})
+    assert valve.stroking and not valves['unit8/v0008'].stroking
+    report.take_diagnostics({'Valves': '200'})
+    assert not valve.stroking

@@ -17,6 +17,13 @@ NOT_MONITORING, LEARNING, HEALTHY, SHELVED, UNKNOWN, ALARM, LATCHED = (
     FaultFlag.STATE_ALARM,
     FaultFlag.STATE_LATCHED,
 )
+NE107 = {
+    FaultFlag.NE107_NORMAL: '',
+    FaultFlag.NE107_MAINTENANCE_REQUIRED: 'M',
+    FaultFlag.NE107_OUT_OF_SPECIFICATION: 'S',
+    FaultFlag.NE107_FUNCTION_CHECK: 'C',
+    FaultFlag.NE107_FAILURE: 'F',
+}
 
 
 class Judged(NamedTuple):

@@ -18,6 +18,7 @@ from damadics_dashboard.live.judged import (
     HEALTHY,
     LATCHED,
     LEARNING,
+    NE107,
     NOT_MONITORING,
     SHELVED,
     UNKNOWN,
@@ -33,13 +34,6 @@ HEARTBEAT_LOST = 2.0  # s; the detector repeats its flag every second
 SAMPLES_LOST = 0.6  # s, or three periods of the samples
 WINDOW = 600.0  # s that plots may show
 MOST_SAMPLES = 150_000
-NE107 = {
-    FaultFlag.NE107_NORMAL: '',
-    FaultFlag.NE107_MAINTENANCE_REQUIRED: 'M',
-    FaultFlag.NE107_OUT_OF_SPECIFICATION: 'S',
-    FaultFlag.NE107_FUNCTION_CHECK: 'C',
-    FaultFlag.NE107_FAILURE: 'F',
-}
 ALARMS = (ALARM, LATCHED, UNKNOWN)
 
 
@@ -101,6 +95,7 @@ class Valve:
         self.isolation: Isolation | None = None
         self.area = ''
         self.fleet: Membership | None = None
+        self.stroking = False  # a fleet says that it makes partial strokes
         self.learned = math.nan  # share of the learning that a fleet reports
         self.period = 0.0
         self.diagnostics: dict[str, dict[str, str]] = {}

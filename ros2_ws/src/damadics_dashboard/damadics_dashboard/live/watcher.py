@@ -14,9 +14,6 @@ from damadics_msgs.msg import (
     Estimate,
     FaultEvent,
     FaultFlag,
-    FleetEvent,
-    FleetLayout,
-    FleetStatus,
     Float64Stamped,
     Isolation,
     Measurement,
@@ -267,8 +264,7 @@ class Watcher:
             self._note_event(name, message)
 
         def take_action(message: OperatorAction) -> None:
-            stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
-            self.history.add_action(action_row(name, message), stamp)
+            self._note_action(name, message)
 
         def take_signature(message: Signature) -> None:
             valve.signature = message
@@ -290,6 +286,10 @@ class Watcher:
     def _valve(self, name: str) -> Valve:
         return self.valves.setdefault(name, Valve(name, self._simulated))
 
+    def _note_action(self, name: str, message: OperatorAction) -> None:
+        stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
+        self.history.add_action(action_row(name, message), stamp)
+
     def _note_event(self, name: str, message: FaultEvent) -> None:
         event, valve = event_row(name, message), self._valve(name)
         valve.unseen.tell(event)
@@ -298,18 +298,8 @@ class Watcher:
 
     def _meet_fleet(self, topic: str, parent: str) -> None:
         """Take what one process says of its many valves."""
-        report = self._fleets[topic] = FleetReport(self._valve, parent)
-
-        def take_status(message: FleetStatus) -> None:
-            report.take_status(message, time.monotonic())
-
-        def take_event(message: FleetEvent) -> None:
-            report.take_event(message, self._note_event)
-
-        node = self._node
-        node.create_subscription(FleetLayout, f'{parent}/layout', report.take_layout, qos.FLAG)
-        node.create_subscription(FleetStatus, topic, take_status, qos.FLAG)
-        node.create_subscription(FleetEvent, f'{parent}/fault_event', take_event, qos.EVENTS)
+        report = self._fleets[topic] = FleetReport(self._valve, parent, self.valves.get)
+        report.subscribe(self._node, self._note_event, self._note_action)
 
     def _take_up(self, name: str, topic: str) -> None:
         if (name, topic) in self._subscriptions:
@@ -341,6 +331,8 @@ class Watcher:
         for status in message.status:
             node = status.name.partition(':')[0]
             parent, _, kind = node.rpartition('/')
+            if report := self._fleets.get(f'/{node}/status'):
+                report.take_diagnostics({v.key: v.value for v in status.values})
             if kind in ('estimator', 'detector') and (valve := self.valves.get(parent)):
                 valve.diagnostics[kind] = {v.key: v.value for v in status.values}
                 valve.diagnostics[kind]['Message'] = status.message

@@ -13,7 +13,7 @@ from damadics_fd.core.text import COMMENT, NAME, plain
 from damadics_fd.web.limits import LARGEST_UPLOAD
 from nicegui import events, run, ui
 
-from damadics_dashboard.live.valve import NE107
+from damadics_dashboard.live.judged import NE107
 from damadics_dashboard.live.watcher import Watcher
 from damadics_dashboard.pages.charts import Options, signature_plot, time_plot
 from damadics_dashboard.pages.elements import box, markup, tell, with_values

@@ -14,7 +14,8 @@ from damadics_fd.core.stamps import SECOND as NANO
 from damadics_fd.core.text import COMMENT, SENTENCE, plain
 from damadics_msgs.msg import FaultEvent
 
-from damadics_dashboard.live.valve import NE107, Alarm, Condition, Valve
+from damadics_dashboard.live.judged import NE107
+from damadics_dashboard.live.valve import Alarm, Condition, Valve
 from damadics_dashboard.store.rows import Cell, EventRow
 from damadics_dashboard.words.texts import Texts
 

@@ -12,7 +12,7 @@ from damadics_fd.core.sample import SIGNALS
 pytest.importorskip('damadics_msgs.msg')
 from damadics_fd.nodes.fleet.ages import Ages
 from damadics_fd.nodes.fleet.blocks import Rows
-from damadics_fd.nodes.fleet.keeping import Keeping
+from damadics_fd.nodes.fleet.keeping import Keeping, Operated
 from damadics_fd.nodes.fleet.members import Members, members_of
 from damadics_fd.nodes.fleet.strokes import FleetStrokes
 from damadics_fd.nodes.fleet.telling import Telling
@@ -41,9 +41,8 @@ class Bench:
         keeping = Keeping(self, self.members, None)
         actions = SimpleNamespace(tell=lambda _, done, text, **more: self.told.append(text))
         self.old = set()
-        self.strokes = FleetStrokes(
-            self, actions, self.members, keeping, lambda number: number in self.old
-        )
+        operated = Operated(self, actions, self.members, keeping)
+        self.strokes = FleetStrokes(operated, lambda number: number in self.old)
         ages = Ages(np.ones(3), False, 0.0)
         causes = load_causes()
         self.telling = Telling(self, self, self.members, keeping, ages, causes, self.strokes)
@@ -94,10 +93,11 @@ def test_strokes_within_one_block_are_counted_and_no_other_valve_is_touched():
     assert bench.sent['/a/stroke_request'] == []
     bench.move(0.58, 0.5, 0.42, 0.5, 0.58)
     assert 'going on' in bench.ask('/plant/b').message
+    assert bench.strokes.values == {'Partial strokes under way': '/plant/b'}
     taken = bench.move(0.5, 0.42, 0.5)
     assert taken.refused == 0
     assert bench.told[-1] == '/plant/b: 2 partial strokes were made'
-    assert bench.strokes.under_way == set()
+    assert bench.strokes.under_way == set() and bench.strokes.values == {}
     assert len(bench.sent['/plant/b/stroke_request']) == 1
 
 

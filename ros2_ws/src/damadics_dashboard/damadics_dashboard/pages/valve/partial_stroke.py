@@ -41,10 +41,10 @@ class StrokeItem:
         state = told.get('Partial strokes', '')
         why = ''
         if not self._watcher.offers(self._valve.name, SERVICE):
-            why = t('stroke_no_service')
+            why = t('stroke_not_allowed' if self._valve.fleet else 'stroke_no_service')
         elif state == 'not allowed':
             why = t('stroke_not_allowed')
-        self._under_way = state == 'under way'
+        self._under_way = state == 'under way' or self._valve.stroking
         self._name.set_text(t('stroke_end' if self._under_way else SERVICE))
         self._why.set_text(why)
         self._why.set_visibility(bool(why))

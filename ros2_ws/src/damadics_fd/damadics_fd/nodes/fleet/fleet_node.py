@@ -20,7 +20,7 @@ from damadics_fd.nodes.fleet import blocks, status
 from damadics_fd.nodes.fleet.ages import Ages
 from damadics_fd.nodes.fleet.handover import Handover
 from damadics_fd.nodes.fleet.jumps import Jumps
-from damadics_fd.nodes.fleet.keeping import Keeping
+from damadics_fd.nodes.fleet.keeping import Keeping, Operated
 from damadics_fd.nodes.fleet.members import Happening, Members, members_of
 from damadics_fd.nodes.fleet.services import FleetServices
 from damadics_fd.nodes.fleet.signatures import Signatures
@@ -112,10 +112,9 @@ class FleetNode(SpinnableNode):
         self._gathered: list[tuple[int, Sample]] = []
         self._jumps = Jumps(len(self._members))
         self._entities = Entities(self)
-        self._actions = OperatorActions(self, self._entities, 'fleet', self._acts)
-        self._strokes = FleetStrokes(
-            self._entities, self._actions, self._members, self._keeping, self._blind
-        )
+        actions = OperatorActions(self, self._entities, 'fleet', self._acts)
+        self._operated = Operated(self._entities, actions, self._members, self._keeping)
+        self._strokes = FleetStrokes(self._operated, self._blind)
         self._telling = Telling(
             self,
             self._entities,
@@ -134,7 +133,7 @@ class FleetNode(SpinnableNode):
         made = self._entities
         self._layout = made.publisher(FleetLayout, 'fleet/layout', qos.FLAG)
         self._status = made.publisher(FleetStatus, 'fleet/status', qos.FLAG)
-        FleetServices(made, self._actions, self._members, self._keeping, self._tell_all)
+        FleetServices(self._operated, self._tell_all)
         self._diagnostics = Diagnostics(self, made, 'fleet', self._report)
         self._telling.expose(exposed, self._gather)
         self._signatures.restore(range(exposed))
@@ -231,6 +230,7 @@ class FleetNode(SpinnableNode):
             'Samples stamped far ahead': self._jumps.refused,
             **{f'Blocks refused: {why}': n for why, n in self._refused.by_reason.items()},
             **{f'Refused of {who}': n for who, n in self._refused.by_sender.items()},
+            **self._strokes.values,
         }
         if self._entities.problem:
             return Level.ERROR, self._entities.problem, values

@@ -5,6 +5,7 @@
 import time
 from collections.abc import Collection
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from rclpy.node import Node
@@ -14,6 +15,8 @@ from damadics_fd.core.modes import PHASE_LEARN_ALPHA, PHASE_LEARN_PHI, PHASE_MON
 from damadics_fd.core.record import Ints
 from damadics_fd.nodes.alarm_memory import AlarmMemory
 from damadics_fd.nodes.fleet.members import Members, first_stamps
+from damadics_fd.nodes.operator import OperatorActions
+from damadics_fd.ros.entities import Entities
 from damadics_fd.store.references import (
     NoReferenceError,
     Reference,
@@ -194,3 +197,12 @@ class Keeping:
         if self._folder is None or not self._folder.is_dir():
             return []
         return [path.name for path in self._folder.iterdir()]
+
+
+class Operated(NamedTuple):
+    """Hold what people need who act on the valves of a fleet."""
+
+    entities: Entities  # of the fleet's node, by which they are served
+    actions: OperatorActions  # the record of what they do
+    members: Members
+    keeping: Keeping

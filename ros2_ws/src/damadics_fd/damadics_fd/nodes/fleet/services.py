@@ -16,10 +16,8 @@ from damadics_msgs.srv import (
 
 from damadics_fd.core.decision.events import Event
 from damadics_fd.core.text import COMMENT, NAME, SENTENCE, plain
-from damadics_fd.nodes.fleet.keeping import Keeping
-from damadics_fd.nodes.fleet.members import Members
-from damadics_fd.nodes.operator import Answered, OperatorActions, Signed, signed
-from damadics_fd.ros.entities import Entities
+from damadics_fd.nodes.fleet.keeping import Operated
+from damadics_fd.nodes.operator import Answered, Signed, signed
 
 ALL = '*'
 MOST_TOLD = 5  # valves that an answer names
@@ -40,26 +38,14 @@ class FleetServices:
     """
     Serve the requests of operators.
 
-    :param entities: of the node.
-    :param actions: the record.
-    :param members: the valves.
-    :param keeping: their alarms and references.
+    :param operated: the valves, their alarms and references, and the record.
     :param told: called with the events of a valve, and who caused them and why.
     """
 
-    def __init__(
-        self,
-        entities: Entities,
-        actions: OperatorActions,
-        members: Members,
-        keeping: Keeping,
-        told: Told,
-    ) -> None:
-        self._actions = actions
-        self._members = members
-        self._keeping = keeping
+    def __init__(self, operated: Operated, told: Told) -> None:
+        entities, self._actions, self._members, self._keeping = operated
         self._told = told
-        self._numbers = {one.namespace: n for n, one in enumerate(members.all)}
+        self._numbers = {one.namespace: n for n, one in enumerate(self._members.all)}
         entities.service(FleetAcknowledge, 'fleet/acknowledge', self._acknowledge)
         entities.service(FleetReset, 'fleet/reset', self._reset)
         entities.service(FleetShelve, 'fleet/shelve', self._shelve)

@@ -6,32 +6,20 @@ from collections.abc import Callable
 from functools import partial
 
 from damadics_fd.core.approximator.state import Estimate
-from damadics_fd.nodes.fleet.keeping import Keeping
-from damadics_fd.nodes.fleet.members import Members
-from damadics_fd.nodes.operator import OperatorActions
+from damadics_fd.nodes.fleet.keeping import Operated
 from damadics_fd.nodes.partial_strokes import PartialStrokes
-from damadics_fd.ros.entities import Entities
 
 
 class FleetStrokes:
     """
     Serve `partial_stroke` and publish `stroke_request` for each valve that allows it.
 
-    :param entities: of the fleet's node.
-    :param actions: the record of what people do.
-    :param members: the valves.
-    :param keeping: their detectors.
+    :param operated: the valves, their detectors, and the record of what people do.
     :param blind: tells of the number of a valve whether its judgement says nothing about now.
     """
 
-    def __init__(
-        self,
-        entities: Entities,
-        actions: OperatorActions,
-        members: Members,
-        keeping: Keeping,
-        blind: Callable[[int], bool],
-    ) -> None:
+    def __init__(self, operated: Operated, blind: Callable[[int], bool]) -> None:
+        entities, actions, members, keeping = operated
         self._members = members
         self._blind = blind
         self.under_way: set[int] = set()  # whose samples are to be followed one by one
@@ -50,6 +38,12 @@ class FleetStrokes:
             for number, member in enumerate(members.all)
             if member.strokes.allowed
         }
+
+    @property
+    def values(self) -> dict[str, str]:
+        """Values for the diagnostics: the valves that make strokes, where there are any."""
+        names = [self._members.all[number].namespace for number in sorted(self.under_way)]
+        return {'Partial strokes under way': ', '.join(names)} if names else {}
 
     def follow(self, number: int, estimate: Estimate) -> None:
         """
