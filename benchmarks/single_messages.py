@@ -78,11 +78,12 @@ class Tested:
         """Send samples for a while; return the CPU time of the process per sample [us]."""
         pid = self._processes[0].pid
         before, first, began = used(pid), self._sent, time.monotonic()
+        date = time.time_ns()  # a driver's samples are stamped with the date
         message = Measurement(cv=0.5, x1=0.5, p1=3.5e6, p2=2.6e6, t1=20.0, flow=5.0, ps=1e5)
         while (made := self._sent - first) < TURN * RATE:
             self._sent += 1
             message.header.stamp.sec, message.header.stamp.nanosec = divmod(
-                int(self._sent * 1e9 / RATE), 10**9
+                date + int((self._sent - first) * 1e9 / RATE), 10**9
             )
             data = serialize_message(message)
             for publisher in self._publishers:

@@ -96,10 +96,9 @@ class DetectorNode(MonitoringNode):
         """Begin afresh, with the alarms from before where they are kept."""
         made = self.entities
         self._core.reset()
-        self._decision = None
-        self._judged = self._twice = 0
+        self._decision, self._judged, self._twice = None, 0, 0
         self.phase, self.last = PHASE_INIT, -1
-        self._was_silent = True
+        self._was_silent, self._looked = True, -1e9
         self._live = LiveJudgement(self._core)
         self._tag = ''
         self._flag = FaultFlag()
@@ -252,7 +251,8 @@ class DetectorNode(MonitoringNode):
             self._tag = self._flag.header.frame_id = tag
         if self._samples.heard and (decision := self._decision):
             self._samples.publish(decision, tag)
-        turned = self._was_silent and self._look()
+        silent = self._was_silent and self.watch.wall >= self._looked + ASKED_EVERY
+        turned = silent and self._look()
         if changed and not turned:
             self._publish_flag()
             self.diagnostics.check()
@@ -288,6 +288,7 @@ class DetectorNode(MonitoringNode):
 
     def _look(self) -> bool:
         """Turn to "not monitoring" when the input falls silent or behind, and back."""
+        self._looked = self.watch.wall
         turned = self._was_silent != self._blind
         if turned:
             self._was_silent = not self._was_silent

@@ -196,7 +196,9 @@ class InputWatch:
         """Number of publishers of the input, as of lately: to ask the graph is costly."""
         now = time.monotonic()
         if now - self._counted > COUNTED_EVERY:
-            self._publishers, self._counted = self._node.count_publishers(self._topic), now
+            with self._node.handle:  # the name is resolved: half the cost
+                count = self._node.handle.get_count_publishers(self._name)
+            self._publishers, self._counted = int(count), now
         return self._publishers
 
     @property
