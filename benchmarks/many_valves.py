@@ -194,6 +194,7 @@ def fleet(
         if mode == 'scada':
             run = simulate('f16_B', rate=1.0, duration=800.0, noise=True, seed=7)
         version = listener.latest['fleet/layout'].version
+        date = time.time_ns()  # from which the samples count, as those of a driver
         sent = 0
         numbers = array.array('I', np.arange(valves, dtype=np.uint32).tobytes())
         instant = blocks = 0
@@ -207,7 +208,7 @@ def fleet(
                 at = slice(instant, instant + instants)
                 instant += instants
                 message.valve = numbers * instants
-                stamps = np.repeat(run.columns['stamp'][at], valves)
+                stamps = np.repeat(run.columns['stamp'][at] + date, valves)
                 message.stamp = array.array('q', stamps.tobytes())
                 for name in SIGNALS:
                     column = np.repeat(np.asarray(run.columns[name][at], np.float64), valves)

@@ -16,6 +16,7 @@ from damadics_fd.nodes.fleet import blocks, status
 from damadics_fd.nodes.fleet.ages import Ages
 from damadics_fd.nodes.fleet.handover import Handover
 from damadics_fd.nodes.fleet.members import Member, Members, members_of
+from damadics_fd.nodes.fleet.raw_block import block_of
 from damadics_fd.ros.raw import sample_of
 from damadics_fd.store.alarms import AlarmStore
 from damadics_fd.store.fleet_file import FleetError, Valve
@@ -35,12 +36,16 @@ def block(valve, stamp, layout=VERSION, **signals):
     return message
 
 
+def raw(*columns, **signals):
+    return block_of(block(*columns, **signals))
+
+
 def member(number, mode='paper'):
     return Member(f'/lv{number}', f'LV-{number}', '', Settings.for_mode(mode), None, '')
 
 
 def test_a_good_block_is_taken_whole():
-    rows, refused = blocks.check(block([0, 1], [5, 5], cv=[0.1, 0.2], x1=[0.3, 0.4]), VERSION, 2)
+    rows, refused = blocks.check(raw([0, 1], [5, 5], cv=[0.1, 0.2], x1=[0.3, 0.4]), VERSION, 2)
     assert not refused
     assert rows.valve.tolist() == [0, 1]
     assert sorted(rows.signals) == ['cv', 'x1']
@@ -55,14 +60,14 @@ def test_a_good_block_is_taken_whole():
     ],
 )
 def test_a_block_that_cannot_be_understood_is_refused_whole(message, reason):
-    rows, refused = blocks.check(message, VERSION, 2)
+    rows, refused = blocks.check(block_of(message), VERSION, 2)
     assert not len(rows.valve)
     assert [one.reason for one in refused] == [reason]
 
 
 def test_rows_of_unknown_valves_and_impossible_stamps_are_refused_alone():
     message = block([0, 9, 1], [1, 1, -1], cv=[0.1, 0.2, 0.3])
-    rows, refused = blocks.check(message, VERSION, 2)
+    rows, refused = blocks.check(block_of(message), VERSION, 2)
     assert rows.valve.tolist() == [0]
     assert rows.signals['cv'].tolist() == [0.1]
     assert {one.reason for one in refused} == {blocks.UNKNOWN, blocks.STAMP}
@@ -76,7 +81,7 @@ def test_a_gateway_numbers_the_valves_as_it_likes():
     others = blocks.OtherLayouts(['/a', '/b'])
     others.learn(FleetLayout(version=3, valve=['/elsewhere', 'b', '/a']))
     message = block([0, 1, 2, 7, 1], [5, 5, 5, 5, -1], layout=3, cv=[0.0, 0.1, 0.2, 0.3, 0.4])
-    rows, refused = blocks.check(message, VERSION, 2, others)
+    rows, refused = blocks.check(block_of(message), VERSION, 2, others)
     assert rows.valve.tolist() == [1, 0], 'the valve of another fleet is none of ours'
     assert rows.signals['cv'].tolist() == [0.1, 0.2]
     assert [(one.reason, one.rows.tolist()) for one in refused] == [
@@ -104,7 +109,7 @@ def test_no_block_however_odd_brings_the_members_down():
                 for name, size in zip(SIGNALS, lengths[1:], strict=True)
             },
         )
-        rows, _ = blocks.check(message, VERSION, 4)
+        rows, _ = blocks.check(block_of(message), VERSION, 4)
         assert len(rows.stamp) == len(rows.valve)
         if len(rows.valve):
             members.take(rows)

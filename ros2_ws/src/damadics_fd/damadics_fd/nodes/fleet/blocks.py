@@ -7,16 +7,17 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from damadics_msgs.msg import FleetLayout, MeasurementBlock
+from damadics_msgs.msg import FleetLayout
 
 from damadics_fd.core.record import Floats, Ints
-from damadics_fd.core.sample import SIGNALS
+from damadics_fd.nodes.fleet.raw_block import RawBlock
 
 MOST_ROWS = 1_000_000  # of one block
 MOST_SENDERS = 100  # that are told apart: frame_id is text from outside
 ELSEWHERE, UNNAMED = -1, -2  # instead of a valve: one of another process, none
 LAYOUT, LENGTHS, ROWS = 'another layout', 'lengths differ', 'too many rows'
 UNKNOWN, STAMP = 'unknown valve', 'stamp before time began'
+UNREADABLE = 'no readable block'
 
 
 class Rows(NamedTuple):
@@ -87,27 +88,25 @@ class OtherLayouts:
 
 
 def check(
-    message: MeasurementBlock, version: int, count: int, others: OtherLayouts | None = None
+    block: RawBlock, version: int, count: int, others: OtherLayouts | None = None
 ) -> tuple[Rows, list[Refusal]]:
     """
     Check a block.
 
-    :param message: the block.
+    :param block: as it came.
     :param version: of the fleet's own layout.
     :param count: number of valves in it.
     :param others: layouts of senders, which it may refer to as well.
     :return: the rows that may be taken, and what was refused and why. Rows of valves that other
         processes judge are neither.
     """
-    own = message.layout == version
-    numbers = np.arange(count) if own else others.numbers(message.layout) if others else None
+    own = block.layout == version
+    numbers = np.arange(count) if own else others.numbers(block.layout) if others else None
     if numbers is None:
         # the indices mean other valves there
         return nothing(), [Refusal(LAYOUT, np.empty(0, np.int64))]
-    index = np.asarray(message.valve, np.uint32).astype(np.int64)
-    stamp = np.asarray(message.stamp, np.int64)
-    columns = {name: np.asarray(getattr(message, name), np.float64) for name in SIGNALS}
-    signals = {name: column for name, column in columns.items() if len(column)}
+    index, stamp = block.valve.astype(np.int64), block.stamp
+    signals = {name: column for name, column in block.signals.items() if len(column)}
     wrong = [LENGTHS] if any(len(x) != len(index) for x in (stamp, *signals.values())) else []
     wrong += [ROWS] if len(index) > MOST_ROWS else []
     if own and not wrong and len(index) and int(index.max()) < count and int(stamp.min()) >= 0:

@@ -15,13 +15,13 @@ from damadics_msgs.msg import (
 
 from damadics_fd.core.decision.events import Event
 from damadics_fd.core.sample import SIGNALS, Sample
-from damadics_fd.core.text import NAME, plain
 from damadics_fd.nodes.fleet import blocks, status
 from damadics_fd.nodes.fleet.ages import Ages
 from damadics_fd.nodes.fleet.handover import Handover
 from damadics_fd.nodes.fleet.jumps import Jumps
 from damadics_fd.nodes.fleet.keeping import Keeping, Operated
 from damadics_fd.nodes.fleet.members import Happening, Members, members_of
+from damadics_fd.nodes.fleet.raw_block import read_block
 from damadics_fd.nodes.fleet.services import FleetServices
 from damadics_fd.nodes.fleet.signatures import Signatures
 from damadics_fd.nodes.fleet.strokes import FleetStrokes
@@ -86,6 +86,7 @@ class FleetNode(SpinnableNode):
         parameters.check()
         try:
             self._members = Members(members_of(valves), self._causes.classes)
+            self._members.warm_up()
         except FleetError as problem:
             raise StartError(f'{problem}') from problem
         folder = default_folder() if kept == 'auto' else Path(kept).expanduser() if kept else None
@@ -137,7 +138,9 @@ class FleetNode(SpinnableNode):
         self._diagnostics = Diagnostics(self, made, 'fleet', self._report)
         self._telling.expose(exposed, self._gather)
         self._signatures.restore(range(exposed))
-        made.subscription(MeasurementBlock, 'measurement_block', self._take_block, qos.BLOCKS)
+        made.subscription(
+            MeasurementBlock, 'measurement_block', self._take_block, qos.BLOCKS, raw=True
+        )
         made.subscription(FleetLayout, 'fleet/layout', self._others.learn, qos.EVENTS)
         made.timer(HEARTBEAT, self._beat)
         if exposed:
@@ -151,17 +154,25 @@ class FleetNode(SpinnableNode):
             f'layout {self._version}'
         )
 
-    def _take_block(self, message: MeasurementBlock) -> None:
-        rows, refusals = blocks.check(message, self._version, len(self._members), self._others)
+    def _take_block(self, data: bytes) -> None:
+        try:
+            block = read_block(data)
+        except ValueError as problem:
+            self.get_logger().error(f'no block: {problem}', throttle_duration_sec=10.0)
+            self._refuse([blocks.Refusal(blocks.UNREADABLE, np.empty(0, np.int64))], '')
+            return
+        rows, refusals = blocks.check(block, self._version, len(self._members), self._others)
         if refusals:
-            sender = plain(message.header.frame_id, NAME)
-            self._refused.note(refusals, sender)
-            self.get_logger().warning(
-                f'block of {sender or "an unnamed sender"} refused in part or whole: '
-                f'{", ".join(one.reason for one in refusals)}',
-                throttle_duration_sec=10.0,
-            )
+            self._refuse(refusals, block.sender)
         self._judge(rows)
+
+    def _refuse(self, refusals: list[blocks.Refusal], sender: str) -> None:
+        self._refused.note(refusals, sender)
+        self.get_logger().warning(
+            f'block of {sender or "an unnamed sender"} refused in part or whole: '
+            f'{", ".join(one.reason for one in refusals)}',
+            throttle_duration_sec=10.0,
+        )
 
     def _judge(self, rows: blocks.Rows) -> None:
         if not len(rows.valve):

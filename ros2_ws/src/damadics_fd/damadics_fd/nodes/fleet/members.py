@@ -19,7 +19,7 @@ from damadics_fd.core.settings import Settings, SettingsError
 from damadics_fd.core.settings.document import parameters_in
 from damadics_fd.core.signature.state import NO_CLASSES
 from damadics_fd.core.text import NAME, plain
-from damadics_fd.nodes.fleet.blocks import Rows
+from damadics_fd.nodes.fleet.blocks import Rows, nothing
 from damadics_fd.nodes.partial_strokes import AMPLITUDES, USUAL, StrokeLimits
 from damadics_fd.store.fleet_file import FleetError, Valve
 
@@ -103,6 +103,11 @@ class Members:
         :return: its bank, and its place there.
         """
         return self.banks[int(self._bank[valve])], int(self._place[valve])
+
+    def warm_up(self) -> None:
+        """Load the compiled loops, so that the first block need not wait for them."""
+        for bank in self.banks:
+            bank.take(*nothing())
 
     def take(self, rows: Rows) -> Taken:
         """
