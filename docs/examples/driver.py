@@ -30,8 +30,11 @@ def main(valve: str) -> None:
             f'no such column: {", ".join(sorted(unknown))}; there are t, {", ".join(SIGNALS)}'
         )
     try:
-        for line in sys.stdin:
-            values = dict(zip(names, map(float, line.split()), strict=True))
+        for number, line in enumerate(sys.stdin, 2):
+            try:
+                values = dict(zip(names, map(float, line.split()), strict=True))
+            except ValueError:
+                sys.exit(f'line {number}: give {len(names)} numbers ({" ".join(names)}): {line}')
             message = Measurement(**{name: values.get(name, NOT_MEASURED) for name in SIGNALS})
             measured = values.get('t')
             stamp = node.get_clock().now() if measured is None else Time(seconds=measured)

@@ -284,7 +284,7 @@ def test_an_alarm_of_a_control_rooms_signals_names_its_causes():
     assert cells['Change'] == 'confidence 71 %'
     assert '1/s' not in cells['Limit']  # a statistic over its limit
     (row,) = history_rows([{**event(FaultEvent.CHANGED), **told, 'text': text}], texts('de'))
-    assert row['text'].startswith('Sieht aus nach f19 flow sensor')
+    assert row['text'].startswith('Sieht aus nach f19 Durchflussmesser oder f2 Ablagerung')
     assert text in row['more']
 
 

@@ -19,6 +19,7 @@ from damadics_dashboard.words.texts import Texts
 from damadics_dashboard.words.valve_words import address, area_of, headline, of_limit, reason_of
 
 PERIOD = 0.2  # s
+ABOVE = 30  # valves from which on alarms stand above the tiles: nobody scrolls past so many
 LARGE = 100  # valves from which on the page is drawn twice a second
 EVERY = 0.9  # s at least between two times that ages and residuals of a large fleet are told
 KINDS = ('F', 'S', 'M', 'C', 'off', 'learn', 'ok')
@@ -63,16 +64,19 @@ def fleet_page(watcher: Watcher) -> None:
         classes = [(kind, t(f'count_{kind}')) for kind in KINDS]
         markup('fleet.html', t=t, classes=classes).classes('w-full')
         trouble = ui.label('').classes('note')
-        markup('tiles.html', t=t, start=START).classes('w-full')
         overview = watcher.overview
+        many = len(watcher.valves) > ABOVE
+        tiles = markup('tiles.html', t=t, start=START).classes('w-full')
 
         def alarmed() -> list[Valve]:
             return [valve for valve in overview.valves if valve.name in overview.alarms]
 
-        with card(t('alarms'), classes='w-full') as head:
+        with card(t('alarms'), classes='w-full above' if many else 'w-full') as head:
             with head:
                 number = ui.label('').classes('sub')
             alarms = AlarmList(watcher, alarmed, t, name=True)
+        if many:
+            tiles.move(target_index=-1)
         tell('filters')
         shown = Tiles(overview, t)
 

@@ -176,7 +176,7 @@ def _show(done: 'Playback', mode: str, t: Texts) -> None:
     names = (e.cause for e in reversed(done.events) if e.cause not in ('', 'undetermined'))
     name = next(names, '')
     cause = cause_of(name, t)
-    suspect = faults_of(name) if cause is None else cause.words()[0]
+    suspect = faults_of(name, t) if cause is None else cause.words()[0]
     facts = (
         done.name,
         f'{t("mode")} {mode}',

@@ -45,6 +45,9 @@
           element.removeAttribute('tabindex');
         }
       });
+    // an alarm that nobody has seen blinks; an endless animation would draw 60 times a second
+    const lit = Math.floor(now / 800) % 2 && document.querySelector('.alarm.fresh');
+    if (Boolean(lit) !== ('lit' in body.dataset)) body.toggleAttribute('data-lit');
     const bare = document.title.replace(/^\([^)]*\) /, '');
     if (!title || bare !== title) title = bare;
     const wanted = present === 'good' ? title : `(${words.short || '!'}) ${title}`;

@@ -29,9 +29,9 @@ class Texts:
 
     def __init__(self, language: str) -> None:
         self.language = language
-        content = resources.files('damadics_dashboard.words').joinpath(f'{language}.yaml')
-        loaded: Mapping[str, str] = yaml.safe_load(content.read_text('utf-8'))
-        self.entries = dict(loaded)
+        loaded: Mapping[str, str] = yaml.safe_load(_content(f'{language}.yaml'))
+        faults: Mapping[str, Mapping[str, str]] = yaml.safe_load(_content('faults.yaml'))
+        self.entries = {**loaded, **faults[language]}
         self.causes: CauseTable = load_causes(_edited[-1] if _edited else None, language)
 
     def __call__(self, key: str, **values: Word) -> str:
@@ -124,6 +124,10 @@ class Texts:
             return self('simulated_time', time=self.local(f'{stamp / SECOND:.2f}'))
         local = time.localtime(stamp / SECOND)
         return time.strftime('%Y-%m-%d %H:%M:%S ', local) + zone(local)
+
+
+def _content(name: str) -> str:
+    return resources.files('damadics_dashboard.words').joinpath(name).read_text('utf-8')
 
 
 def zone(local: time.struct_time) -> str:

@@ -120,19 +120,23 @@ def cause_of(name: str, t: Texts) -> Cause | None:
     return t.causes.causes.get(name) if name not in SHARED else None
 
 
-def faults_of(names: str) -> str:
+def faults_of(names: str, t: Texts) -> str:
     """
     Word the faults of the benchmark that a control room's signals show.
 
     :param names: as an event of mode scada carries them.
+    :param t: the words.
     :return: '' where they are no such names.
 
-    >>> faults_of('f19 or f2'), faults_of('friction_up')
+    >>> from damadics_dashboard.words.texts import texts
+    >>> faults_of('f19 or f2', texts('en')), faults_of('friction_up', texts('en'))
     ('f19 flow sensor or f2 plug or seat sedimentation', '')
     """
-    known = {f'f{number}': name for number, name in NAMES.items()}
+    known = {f'f{number}': t(f'fault_{number}') for number in NAMES}
     named = names.split(' or ')
-    return ' or '.join(f'{n} {known[n]}' for n in named) if set(named) <= set(known) else ''
+    if not set(named) <= set(known):
+        return ''
+    return t('fault_or').join(f'{name} {known[name]}' for name in named)
 
 
 def headline(event: EventRow, t: Texts) -> tuple[str, str, str]:
@@ -152,7 +156,7 @@ def headline(event: EventRow, t: Texts) -> tuple[str, str, str]:
             event.get('deviation', math.nan),
             math.nan if confidence is None else confidence,
         )
-    if named := faults_of(event.get('cause') or ''):
+    if named := faults_of(event.get('cause') or '', t):
         sure = event.get('confidence')
         numbers = '' if sure is None else t('sure', share=t.percent(min(sure, MOST_CERTAIN)))
         return t('looks_like', cause=named), numbers, t('deviates_advice')
@@ -211,7 +215,7 @@ def found_by(event: EventRow, t: Texts) -> str:
     :param t: the words.
     :return: a sentence, '' where nothing is known.
     """
-    if event.get('found_by') == 'control-room test' or faults_of(event.get('cause') or ''):
+    if event.get('found_by') == 'control-room test' or faults_of(event.get('cause') or '', t):
         return t('found_test')
     ratio = event.get('ratio')
     if ratio is None or not math.isfinite(ratio):
@@ -252,7 +256,7 @@ def _row(row: EventRow, t: Texts) -> dict[str, Cell]:
     elif transition == FaultEvent.NEAR_MISS and row['ratio'] is not None:
         what = t('near_miss_text', size=of_limit(row['ratio'], t))
     told = plain(row['text'] or '', SENTENCE)
-    if faults_of(row['cause'] or ''):  # the sentence says how much is off
+    if faults_of(row['cause'] or '', t):  # the sentence says how much is off
         advice = f'{told}. {advice}'
     return {
         'moment': t.moment(row['stamp']),

@@ -24,6 +24,7 @@ from ..bag.bag_support import as_csv, needs_messages, replayed, stroke
         (['x.csv', '--out', 'x.xls'], 'the suffix must be one of'),
         (['x.csv', '--map', 'cv'], 'write SIGNAL='),
         (['x.csv', '--map', 'cv=none'], 'there is no such column'),
+        (['x.csv', '--map', 'cv=1-SP*0.01'], r'write SP\[UNIT\] invert, or SP\*-FACTOR\+1'),
         (['x.csv', '--set', 'k1=-1', '--set', 'bogus=2'], r'bogus: no such setting.*k1 = -1'),
         (['x.csv', '--set', 'tlearn=3'], r'do you mean t_learn\?'),
     ],

@@ -66,8 +66,9 @@ def simulator_panel(watcher: Watcher, valve: Valve, t: Texts) -> None:
 
         with box('div', 'faults'):
             for fault, name in sorted(FAULTS.items()):
-                number, _, words = name.partition('_')
-                text = f'{number.lower()}  {words.replace("_", " ").lower()}'
+                number = name.partition('_')[0]
+                text = f'{number.lower()}  {t(f"fault_{fault}")}'
                 with_values(
-                    button(text, inject(fault)), aria_label=f'{t("inject")} {fault}: {words}'
+                    button(text, inject(fault)),
+                    aria_label=f'{t("inject")} {fault}: {t(f"fault_{fault}")}',
                 )

@@ -111,7 +111,21 @@ def _find(names: Sequence[Header], target: str, source: Source) -> int:
     raise BagError(
         f'--map {target}={source.name}: there is no such column; there are '
         + ', '.join(header.text for header in names)
+        + _turned_round(wanted)
     )
+
+
+def _turned_round(wanted: str) -> str:
+    """
+    Say how a difference is written, where somebody wrote one.
+
+    >>> _turned_round('1-SP'), _turned_round('SP')
+    ('; write SP[UNIT] invert, or SP*-FACTOR+1', '')
+    """
+    found = re.fullmatch(r'(\d[\d.]*)\s*-\s*(\S.*)', wanted)
+    if not found:
+        return ''
+    return f'; write {found[2]}[UNIT] invert, or {found[2]}*-FACTOR+{found[1]}'
 
 
 @dataclass(frozen=True)
