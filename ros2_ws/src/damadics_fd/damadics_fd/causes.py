@@ -21,7 +21,7 @@ from damadics_fd.store.yaml_text import read_yaml
 
 NE107_NAMES = ('normal', 'maintenance', 'out_of_specification', 'function_check', 'failure')
 FIELDS = ('tag', 'value', 'less', 'factor', 'bar', 'margin', 'confidence', 'second')
-TEXTS = ('text', 'detail', 'advice')
+TEXTS = ('text', 'unsized', 'detail', 'advice')
 KEYS = (*TEXTS, 'ne107')
 LANGUAGES = ('en', 'de')
 MOST_CERTAIN = 0.99  # no text promises 100 %
@@ -67,6 +67,7 @@ class Cause:
     ne107: int  # as in damadics_msgs/FaultFlag
     detail: str = ''
     language: str = 'en'
+    unsized: str = ''  # in place of `text` while nobody knows how much
 
     def words(
         self,
@@ -102,7 +103,8 @@ class Cause:
         if not math.isnan(confidence):
             sure = 'Wahrscheinlichkeit' if self.language == 'de' else 'confidence'
             known.append(f'{sure} {words["confidence"]:.0%}')
-        return self.text.format(**words), ', '.join(known), self.advice.format(**words)
+        text = self.unsized if math.isnan(value) and self.unsized else self.text
+        return text.format(**words), ', '.join(known), self.advice.format(**words)
 
     def describe(
         self,
@@ -163,6 +165,8 @@ def load_causes(path: Path | None = None, language: str = 'en') -> CauseTable:
 
     >>> load_causes()['spring_softer'].describe('LV-101', -0.05, 0.0005, 0.99)[0]
     'LV-101: The spring is 5.0 % softer than learned. (-5.0 % ± 0.1 %, confidence 99 %)'
+    >>> load_causes()['friction_up'].words()[0]
+    'Friction is higher than normal; how much is not known yet.'
     """
     causes, limits = _parse(_own('causes.yaml'), 'causes.yaml')
     if language != 'en':
@@ -228,7 +232,8 @@ def _is_limit(value: Plain) -> TypeGuard[float]:
 def _cause(name: str, entry: Saved, default: Cause | None, problems: list[str]) -> Cause:
     texts = {}
     for key in TEXTS:
-        texts[key] = entry.get(key, getattr(default, key, ''))
+        given = '' if key == 'unsized' and 'text' in entry else getattr(default, key, '')
+        texts[key] = entry.get(key, given)  # who words a cause anew words it whole
         problem = _template_problem(texts[key])
         if problem:
             problems.append(f'{name}, {key}: {problem}')
@@ -241,7 +246,8 @@ def _cause(name: str, entry: Saved, default: Cause | None, problems: list[str]) 
         problems.append(f'{name}: ne107 {level!r} is not one of {", ".join(NE107_NAMES)}')
         ne107 = 0
     language = default.language if default is not None else 'en'
-    return Cause(str(texts['text']), str(texts['advice']), ne107, str(texts['detail']), language)
+    text, unsized, detail, advice = (str(texts[key]) for key in TEXTS)
+    return Cause(text, advice, ne107, detail, language, unsized)
 
 
 def _template_problem(text: Plain) -> str:

@@ -1,9 +1,10 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
 import math
+import re
 
 import pytest
-from damadics_fd.causes import CauseTableError, explain, load_causes
+from damadics_fd.causes import LANGUAGES, CauseTableError, explain, load_causes
 from damadics_fd.commands.replay.bags import collect
 from damadics_fd.core.decision.alarm import CHANGED, RAISED
 from damadics_fd.core.decision.events import Event
@@ -73,8 +74,9 @@ def test_a_wrong_file_is_refused_with_every_error(tmp_path, content, complaints)
         assert complaint in str(error.value)
 
 
-def test_an_unknown_strength_reads_unknown():
-    assert 'unknown' in load_causes()['supply'].describe('V', math.nan, math.nan, 0.9)[0]
+def test_a_strength_that_is_not_known_is_left_out():
+    said = load_causes()['supply'].describe('V', math.nan, math.nan, 0.9)[0]
+    assert said == 'V: The air supply has changed. (confidence 90 %)'
 
 
 def event(transition: int, occurrence: int = 1, cause: str = '', level: int = 1, **values):
@@ -121,3 +123,17 @@ def test_replay_puts_a_later_cause_into_its_detection():
     assert [d['cause'] for d in found] == ['friction_up', '']
     assert found[0]['strength'] == 0.5 and found[0]['spread'] == 0.02
     assert found[0]['text'] == 'raised' and found[1]['strength'] is None
+
+
+@pytest.mark.parametrize('language', LANGUAGES)
+def test_no_text_tells_a_size_that_nobody_knows(language):
+    for name, cause in load_causes(language=language).causes.items():
+        said = ' '.join(cause.words(confidence=0.9))
+        assert not re.search('unknown|unbekannt|nan', said), f'{name}: {said}'
+
+
+def test_who_words_a_cause_anew_reads_these_words_whatever_is_known(tmp_path):
+    own = tmp_path / 'causes.yaml'
+    own.write_text('causes: {friction_up: {text: "Packung {factor:.1f}"}}')
+    cause = load_causes(own)['friction_up']
+    assert cause.words(1.0)[0] == 'Packung 2.0' and cause.words()[0] == 'Packung unknown'
