@@ -305,6 +305,7 @@ def main(args: Sequence[str] | None = None) -> int:
         text = ET.tostring(tree.getroot(), encoding='unicode', xml_declaration=True) + '\n'
         if options.out:
             options.out.write_text(text)
+            print(f'written: {options.out}')
         else:
             print(text, end='')
     except (FleetError, OSError) as problem:

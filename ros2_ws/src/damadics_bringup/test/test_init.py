@@ -5,7 +5,7 @@ import yaml
 from damadics_bringup.fleet import simulated
 from damadics_bringup.init import main
 from damadics_fd.core.settings.settings import Settings
-from damadics_fd.store.fleet_file import read_fleet
+from damadics_fd.store.fleet_file import FleetError, read_fleet
 
 
 @pytest.mark.parametrize('mode', ['monitor', 'scada'])
@@ -76,6 +76,11 @@ def test_files_of_before_are_not_overwritten(tmp_path, capsys):
     assert main([str(tmp_path), '--valve', 'LV-101']) == 2
     assert 'fleet.yaml already' in capsys.readouterr().err
     assert (tmp_path / 'fleet.yaml').read_text() == 'mine'
+
+
+def test_a_folder_in_place_of_its_list_is_told_with_the_list(tmp_path):
+    with pytest.raises(FleetError, match=r'is a folder: give its list, .*fleet\.yaml$'):
+        read_fleet(tmp_path)
 
 
 def test_in_a_mixed_fleet_only_the_simulated_valves_get_a_plant(tmp_path):

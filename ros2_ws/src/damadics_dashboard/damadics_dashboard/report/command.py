@@ -129,7 +129,11 @@ def write(options: argparse.Namespace, since: float, until: float) -> list[Path]
                 of_tag = {tag: name for name, tag in history.tags().items()}
                 valve = of_tag.get(valve, valve)
             if valve not in known:
-                hint = suggestion(options.what, known) or f'known are {", ".join(known)}'
+                hint = suggestion(options.what, known) or (
+                    f'known are {", ".join(known)}'
+                    if known
+                    else 'of no valve; what happens is kept while the page runs'
+                )
                 raise ValueError(f'nothing is known of {options.what}: {hint}')
             report = content.valve_report(sources, valve, since, until, t)
     finally:

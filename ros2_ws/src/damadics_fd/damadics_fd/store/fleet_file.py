@@ -75,6 +75,8 @@ def read_fleet(path: Path | str) -> list[Valve]:
     path = Path(path)
     try:
         content = read_yaml(path.read_text('utf-8-sig'))
+    except IsADirectoryError as problem:
+        raise FleetError(f'{path} is a folder: give its list, {path / "fleet.yaml"}') from problem
     except OSError as problem:
         raise FleetError(f'{path}: {problem.strerror}') from problem
     except UnicodeDecodeError as problem:
