@@ -25,6 +25,8 @@ def answer_words(text: str, language: str) -> str:
 
     >>> answer_words('alarm 3 acknowledged', 'de'), answer_words('alarm 3 acknowledged', 'en')
     ('Alarm 3 quittiert.', 'alarm 3 acknowledged')
+    >>> answer_words('p1 is the constant 3 Pa: it is not measured; an alarm stands', 'de')
+    'p1 ist die Konstante 3 Pa: es wird nicht gemessen; ein Alarm steht an'
     >>> answer_words('partial strokes ended: an alarm stands', 'de')
     'Teilhübe beendet: ein Alarm steht an'
     """

@@ -8,6 +8,7 @@ from typing import NamedTuple
 from damadics_fd.core.settings.identified import VERDICTS
 from damadics_fd.core.text import SENTENCE, plain
 
+from damadics_dashboard.words.answers import answer_words
 from damadics_dashboard.words.texts import Texts
 
 FRICTION = 'Friction change found within an hour (%)'
@@ -40,5 +41,5 @@ def commission_words(told: Mapping[str, str], t: Texts) -> CommissionWords:
     if FRICTION in told and STIFFNESS in told:
         friction, stiffness = (t.local(plain(told[name])) for name in (FRICTION, STIFFNESS))
         finds = t('commission_finds', friction=friction, stiffness=stiffness)
-    because = plain(told.get('Commissioned because', ''), SENTENCE)
+    because = answer_words(plain(told.get('Commissioned because', ''), SENTENCE), t.language)
     return CommissionWords(verdict, t(f'commission_{verdict}'), finds, because)
