@@ -23,8 +23,10 @@ from damadics_fd.core.valve.pneumatics import (
     transducer,
 )
 
-SUB_STEPS = 7  # of 5 ms
-COARSE_SUB_STEPS = 7  # enough for minutes
+SUB_STEPS = 4  # Euler steps per controller tick, at least
+MOST_SUB_STEPS = 40
+STEADY = 0.75  # of the stem's time constant, the longest step
+PRESSURE = 4.0e5  # Pa absolute, about the middle of what a chamber has
 GAS = GAS_CONSTANT * AIR_TEMPERATURE
 MINIMUM_SUPPLY = 1.2e5
 
@@ -111,6 +113,14 @@ def copy_stem(source: StemState, target: StemState) -> None:
 
 
 @jit
+def steps_per_tick(act: Valve) -> int:
+    """Return how many Euler steps the stem takes per tick of the positioner, stiff as it is."""
+    air = act.area * act.area * PRESSURE / act.chamber_volume if act.chamber_volume > 0.0 else 0.0
+    steps = act.positioner_period * (act.stiffness + air) / (STEADY * act.viscous)
+    return int(min(max(math.ceil(min(steps, MOST_SUB_STEPS)), SUB_STEPS), MOST_SUB_STEPS))
+
+
+@jit
 def advance_stem(
     m: StemState,
     act: Valve,
@@ -123,7 +133,6 @@ def advance_stem(
     dp1: float,
     slope0: float,
     slope1: float,
-    sub_steps: int = SUB_STEPS,
 ) -> float:
     """
     Advance the stem from t0 to t1 and return its measured position, 0..1.
@@ -139,11 +148,11 @@ def advance_stem(
     :param cv0: CV at t0; cv1 at t1.
     :param dp0: pressure drop at t0, share of 4 MPa; dp1 at t1.
     :param slope0: its slope at t0, 1/s; slope1 at t1.
-    :param sub_steps: Euler steps per controller tick.
     :return: X', the position a sensor shows.
     """
     dt = t1 - t0
     lag = math.exp(-act.positioner_period / act.positioner_lag)
+    sub_steps = steps_per_tick(act)
     h = act.positioner_period / sub_steps
     mobility = h / act.viscous
     stroke = act.stroke

@@ -10,7 +10,6 @@ from damadics_fd.core.jit import jit
 from damadics_fd.core.scada.laws.actuator import F_RANGE, P_RANGE, T_RANGE, valve_flow
 from damadics_fd.core.scada.laws.stem_law import shrink
 from damadics_fd.core.scada.model import (
-    COARSE_SUB_STEPS,
     Faults,
     StemState,
     advance_stem,
@@ -53,7 +52,6 @@ def stem_error(
             e.dp,
             e.slope0,
             e.slope,
-            COARSE_SUB_STEPS,
         )
         if i >= first:
             error = e.x - x - e.correction
