@@ -5,12 +5,15 @@
 import numpy as np
 import pytest
 from damadics_fd.commands.commission.balance import find_balance
-from damadics_fd.commands.commission.errors import CommissioningError
+from damadics_fd.commands.commission.monitor import identify
 from damadics_fd.commands.commission.signals import gather
-from damadics_fd.commands.commission.twin import twin
+from damadics_fd.commands.commission.twin.constants import twin
 from damadics_fd.core.monitor import run
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.settings.identified import FaultFree
+from damadics_plant import Scenario, simulate
+from damadics_plant.actuator.twin import twin_of
+from damadics_plant.scenarios.sources import Recorded
 
 from . import courses, kinds
 from . import valve as foreign
@@ -172,13 +175,37 @@ def test_a_standing_fault_is_one_occurrence():
     assert t.occurrences <= 1
 
 
-def test_a_twin_has_what_was_found(tmp_path):
-    build = kinds.random_valve(27)
-    proposal = commissioned(build, 27, minutes=10.0)
-    constants = twin(proposal)
+def test_hysteresis_of_the_diaphragm_is_no_friction():
+    sound, build = kinds.random_valve(3311), kinds.random_valve(3311, hysteresis=0.02)
+    assert commissioned(sound, 3311, minutes=10.0).settings.hysteresis == 0.0
+    proposal = commissioned(build, 3311, minutes=10.0)
+    assert proposal.settings.hysteresis == pytest.approx(0.02 * build.force, rel=0.3)
+    for fault in ('friction +100 %', 'dry +300 %'):
+        t = trial(build, proposal, fault, 3311, quiet=300.0)
+        assert t.right
+        assert abs(t.size - t.true) < 2.0 * t.std
+        assert t.size == pytest.approx(t.true, rel=0.15)
+
+
+@pytest.mark.parametrize(
+    ('seed', 'other'), [(27, {}), (28, {'air_to': 'open', 'flow_to': 'close'})]
+)
+def test_a_twin_moves_as_the_valve_did(seed, other):
+    low = {'p1': 1.2e6, 'p2': 0.9e6} if other else {}
+    build = kinds.random_valve(seed, **other, **low)
+    columns = foreign.simulate(build, courses.steps(600.0, seed), seed=seed)
+    half = len(columns['x1']) // 2
+    sheet = foreign.sheet(build)
+    first = [FaultFree('first half', {name: c[:half] for name, c in columns.items()})]
+    constants = twin(identify(first, Settings.for_mode('monitor', **sheet), sheet))
     assert constants['stiffness'] == pytest.approx(build.stiffness, rel=0.03)
     assert constants['static'] >= constants['coulomb'] > 0.0
-    assert 0.0 < constants['lag'] < 1.0
-    other = commissioned(kinds.random_valve(27, air_to='open', flow_to='close'), 27, minutes=10.0)
-    with pytest.raises(CommissioningError, match='air to open'):
-        twin(other)
+    t = np.arange(2 * half) * 0.005
+    scenario = Scenario(
+        'as recorded',
+        3.0 * half * 0.005,
+        **{name: Recorded(t, columns[name]) for name in ('cv', 'p1', 'p2')},
+    )
+    again = simulate(scenario, rate=200.0, model=twin_of(constants, 'here'))['x1'][: 2 * half]
+    error = (np.asarray(again) - columns['x1'])[half:]
+    assert np.sqrt(np.mean(error**2)) < 0.015

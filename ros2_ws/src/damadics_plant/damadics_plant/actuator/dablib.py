@@ -24,7 +24,7 @@ from damadics_fd.core.valve.pneumatics import (
 
 from damadics_plant.actuator.measure import measure
 from damadics_plant.actuator.parameters import Actuator, Constants
-from damadics_plant.actuator.physics import plug_force
+from damadics_plant.actuator.physics import KM, plug_force
 from damadics_plant.faults.effects import Effects, FaultRow, update_effects
 
 RATE = 400.0
@@ -169,7 +169,7 @@ def simulate_block(
 
         held = (
             a.mass * a.gravity
-            - plug_force(xr, max(p1, s.pv) - p2, a.plug_diameter)
+            - plug_force(KM, xr, max(p1, s.pv) - p2, a.plug_diameter)
             - a.stiffness * (s.X_ + a.preload) * e.spring
         )
         m1, p1_, v1 = _derivatives(s.ma, s.p, s.v, s.x, inflow, held, width, s, a, e)

@@ -16,9 +16,10 @@ from damadics_fd.core.record import Floats, Record, Rows
 from damadics_fd.core.valve.flow import vapour_pressure
 from damadics_fd.core.valve.parameters import Valve
 from damadics_fd.core.valve.pneumatics import ATMOSPHERE, air_flow, set_point_filter, transducer
+from damadics_fd.core.valve.tables import interpolate
 
 from damadics_plant.actuator.measure import measure
-from damadics_plant.actuator.parameters import Constants, LuGreActuator
+from damadics_plant.actuator.parameters import Constants, LuGreActuator, TwinActuator
 from damadics_plant.actuator.physics import plug_force, plug_stiffness
 from damadics_plant.faults.effects import Effects, FaultRow, update_effects
 
@@ -46,6 +47,7 @@ class State(Record):
     z: float  # stem [m/s, m], bristles [m]
     xb: float
     e: float  # position feedback [m], held E/P output
+    reset: float  # integral of the error of a positioner of one's own
     t1: float
     pv: float  # medium [degC], its vapour pressure [Pa]
     k: int
@@ -55,13 +57,15 @@ class State(Record):
 
 def initial_state(a: LuGreActuator) -> np.ndarray:
     """
-    Return the state at scenario zero: valve open and at rest, chamber vented.
+    Return the state at scenario zero: at rest, chamber vented, where the spring has moved it.
 
     :param a: constants of the actuator.
     :return: structured array of shape (1,).
     """
     state = State.rows()
     state['ma'] = ATMOSPHERE * a.dead_volume / (a.gas_constant * a.air_temperature)
+    if isinstance(a, TwinActuator) and a.air_opens:
+        state['x'] = state['xb'] = a.stroke  # the spring has closed it
     state['t1'] = math.nan
     return state
 
@@ -123,24 +127,67 @@ def _half_step(
 
 
 @jit
+def chamber(x: float, a: Constants, e: Effects) -> float:
+    """
+    Evaluate the volume of the chamber.
+
+    :param x: position of the stem [m].
+    :param a: constants of the actuator.
+    :param e: effects of the faults.
+    :return: [m3].
+    """
+    way = a.stroke - x if a.air_opens > 0.0 else x
+    volume: float = a.dead_volume + e.area * way
+    return volume
+
+
+@jit
+def booster(s: State, a: Constants) -> float:
+    """
+    Evaluate the positioner.
+
+    :param s: state; set point and feedback are read, the integral of the error is kept.
+    :param a: constants of the actuator.
+    :return: opening of the booster, > 0 fills the chamber, < 0 vents it.
+    """
+    position = s.xb / a.stroke
+    if a.errors[0] >= 0.0:
+        return transducer(s.y2, position, a.gain)
+    error = (s.y2 - position) * (1.0 - 2.0 * a.air_opens)
+    reset = s.reset + a.reset_rate * error * a.hold
+    s.reset = min(max(reset, -0.5 * a.reset_band), 0.5 * a.reset_band)
+    if abs(error) > a.reset_band:
+        s.reset = 0.0
+    return interpolate(error + s.reset, a.errors, a.openings)
+
+
+@jit
 def _substep(s: State, a: Constants, e: Effects, dp: float, h: float) -> None:
     rt = a.gas_constant * a.air_temperature
-    volume = a.dead_volume + e.area * s.x
+    volume = chamber(s.x, a, e)
     p = s.ma * rt / volume
-    flow = air_flow(min(max(s.e * e.opening, -1.0), 1.0), e.supply, p - ATMOSPHERE, a.air_flow)
+    factor = a.air_flow
+    if a.errors[0] < 0.0:
+        slope = a.fill_slope if s.e > 0.0 else a.vent_slope
+        factor *= max(1.0 + slope * ((p - ATMOSPHERE) / a.supply - 0.5), 0.0)
+    flow = air_flow(min(max(s.e * e.opening, -1.0), 1.0), e.supply, p - ATMOSPHERE, factor)
     if e.leak > 0.0:
         flow -= e.leak * math.sqrt(abs(p - ATMOSPHERE))
     p_mid = (s.ma + 0.5 * h * flow) * rt / volume
     xr = s.x / a.stroke + e.xr_offset
     k = a.stiffness * e.spring
+    air, flows = 1.0 - 2.0 * a.air_opens, 1.0 - 2.0 * a.flow_closes
+    relaxed = a.stroke + a.preload if a.air_opens > 0.0 else -a.preload
     force = (
         a.mass * a.gravity
-        + e.area * (p_mid - ATMOSPHERE)
-        - plug_force(xr, dp, a.plug_diameter)
-        - k * (s.x + a.preload)
+        + air * e.area * (p_mid - ATMOSPHERE)
+        - flows * plug_force(a.recovery, xr, dp, a.plug_diameter)
+        - k * (s.x - relaxed)
     )
     stiffness = (
-        k + e.area * e.area * p_mid / volume + plug_stiffness(xr, dp, a.plug_diameter, a.stroke)
+        k
+        + e.area * e.area * p_mid / volume
+        + flows * plug_stiffness(a.recovery, xr, dp, a.plug_diameter, a.stroke)
     )
     v, z = _half_step(s.v, s.z, 0.5 * h, a.mass, force, stiffness, e.friction, a)
     x = s.x + h * v  # twice the half step: y+ = 2 y_half - y
@@ -193,10 +240,7 @@ def simulate_block(
             s.t1, s.pv = t1, vapour_pressure(t1)
         s.x = min(s.x, e.stop)
         if i % every == 0:
-            ps = (
-                s.ma * a.gas_constant * a.air_temperature / (a.dead_volume + e.area * s.x)
-                - ATMOSPHERE
-            )
+            ps = s.ma * a.gas_constant * a.air_temperature / chamber(s.x, a, e) - ATMOSPHERE
             x = s.x / a.stroke
             measure(x + e.xr_offset, x, ps, p1, p2, t1, s.pv, a, e, out[:, i // every])
         dp = max(p1, s.pv) - p2
@@ -206,7 +250,7 @@ def simulate_block(
             fed_back = min(max(fed_back, -0.01 * longer), 0.05 * longer)  # reach of the lever
             s.xb = min(max(s.xb, fed_back - 0.5 * e.feedback), fed_back + 0.5 * e.feedback)
             if s.substep * h >= s.held * a.hold - 1e-9:
-                s.e = transducer(s.y2, s.xb / a.stroke, a.gain)
+                s.e = booster(s, a)
                 s.held += 1
             ma, v, x, z = s.ma, s.v, s.x, s.z
             _substep(s, a, e, dp, h)

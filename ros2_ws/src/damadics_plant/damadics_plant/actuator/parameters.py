@@ -3,12 +3,19 @@
 """Constants of the DAMADICS actuator (DABLib v1.22) and of its LuGre variant, in one place."""
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
-from damadics_fd.core.record import Array, Record
+from damadics_fd.core.record import Array, Floats, Record
 from damadics_fd.core.sample import TABLE
 from damadics_fd.core.valve.parameters import Valve
+from damadics_fd.core.valve.plug import RECOVERY
 from damadics_fd.core.valve.pneumatics import AIR_TEMPERATURE, GAS_CONSTANT
+
+NODES = 31
+"""Errors at which the opening of a positioner of one's own is stated."""
+
+OTHERWISE = {'recovery': RECOVERY}
+"""Of an actuator that is no twin; all else is 0."""
 
 VALVE = Valve()
 """The benchmark's valve as its monitor knows it."""
@@ -18,7 +25,7 @@ RANGES = {signal.name: signal.span for signal in TABLE if signal.name != 'ps'}
 
 
 class Constants(Record):
-    """What compiled code knows of an actuator of either model; units as in `LuGreActuator`."""
+    """What compiled code knows of an actuator of either model; units as in `TwinActuator`."""
 
     stroke: float
     mass: float
@@ -46,6 +53,15 @@ class Constants(Record):
     stribeck: float
     bristle_stiffness: float
     bristle_damping: float
+    air_opens: float
+    flow_closes: float
+    recovery: Annotated[Floats, len(RECOVERY)]
+    errors: Annotated[Floats, NODES]
+    openings: Annotated[Floats, NODES]
+    reset_rate: float
+    reset_band: float
+    fill_slope: float
+    vent_slope: float
 
 
 @dataclass(frozen=True)
@@ -112,7 +128,7 @@ class Actuator:
         """
         constants = Constants.rows()
         for name in Constants.names():
-            constants[name] = getattr(self, name, 0.0)
+            constants[name] = getattr(self, name, OTHERWISE.get(name, 0.0)) or 0.0
         return constants
 
 
@@ -137,3 +153,28 @@ class LuGreActuator(Actuator):
     """sigma_0 [N/m]."""
     bristle_damping: float = 1000.0
     """sigma_1 [N s/m]."""
+
+
+@dataclass(frozen=True)
+class TwinActuator(LuGreActuator):
+    """The actuator with LuGre friction and what else a valve of one's own has otherwise."""
+
+    air_opens: float = 0.0
+    """1: the air opens the valve and the spring closes it; 0: the other way."""
+    flow_closes: float = 0.0
+    """1: the flow pushes the plug to close; 0: to open."""
+    recovery: tuple[float, ...] = RECOVERY
+    """K_m of the plug force at 0, 10, .., 90, 99, 100 % of the stroke."""
+    errors: tuple[float, ...] = ()
+    """Set-point less position at `NODES` points, rising, 0 in their middle; empty: the
+    benchmark's lever and transducer."""
+    openings: tuple[float, ...] = ()
+    """Opening of the booster there as a share of `air_flow`: > 0 fills, < 0 vents."""
+    reset_rate: float = 0.0
+    """Rate at which such a positioner integrates the error, to half of the band at most [1/s]."""
+    reset_band: float = 0.1
+    """Error beyond which it begins anew, share of the stroke."""
+    fill_slope: float = 0.0
+    """Growth of the filling flow beside the root law with the chamber pressure, per supply."""
+    vent_slope: float = 0.0
+    """The same of venting."""

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 from damadics_fd.core.jit import jit
+from damadics_fd.core.record import Floats
 from damadics_fd.core.valve.plug import RECOVERY, recovery, tangent
 
 KM = np.array(RECOVERY)
@@ -13,26 +14,28 @@ KM = np.array(RECOVERY)
 
 
 @jit
-def plug_force(xr: float, dp: float, diameter: float) -> float:
+def plug_force(km: Floats, xr: float, dp: float, diameter: float) -> float:
     """
     Evaluate the force of the medium on the plug, which opens the valve.
 
+    :param km: pressure recovery coefficient over X_r, `KM` or of a valve of one's own.
     :param xr: relative position of the plug.
     :param dp: pressure drop over the valve [Pa].
     :param diameter: of the plug [mm].
     :return: F_vc [N].
 
-    >>> round(plug_force(0.0, 0.9e6, 50.0))
+    >>> round(plug_force(KM, 0.0, 0.9e6, 50.0))
     1767
     """
-    return dp / recovery(KM, xr) * (math.pi * diameter * diameter / 4e6)
+    return dp / recovery(km, xr) * (math.pi * diameter * diameter / 4e6)
 
 
 @jit
-def plug_stiffness(xr: float, dp: float, diameter: float, stroke: float) -> float:
+def plug_stiffness(table: Floats, xr: float, dp: float, diameter: float, stroke: float) -> float:
     """
     Evaluate the slope of the plug force over the position.
 
+    :param table: as `km` of `plug_force`.
     :param xr: relative position of the plug.
     :param dp: pressure drop over the valve [Pa].
     :param diameter: of the plug [mm].
@@ -41,5 +44,5 @@ def plug_stiffness(xr: float, dp: float, diameter: float, stroke: float) -> floa
     """
     if xr < 0.0 or xr >= 1.0:
         return 0.0
-    km, slope = tangent(KM, xr)
+    km, slope = tangent(table, xr)
     return -dp / (km * km) * slope / stroke * (math.pi * diameter * diameter / 4e6)

@@ -6,14 +6,19 @@ from dataclasses import fields
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
 import yaml
-from damadics_fd.core.record import Saved
+from damadics_fd.core.record import Plain, Saved
 from damadics_fd.core.settings.document import PLANT, ValveDocument, differing, section
+from damadics_fd.core.valve.plug import RECOVERY
 
-from damadics_plant.actuator.parameters import LuGreActuator
+from damadics_plant.actuator.parameters import NODES, TwinActuator
 
 ENTRY, OPERATION, SETTINGS = 'twin', 'operation', 'settings'
 OF_FILE = ('actuator', 'sample_rate')  # not of the model
+TABLES = {'recovery': 12, 'errors': NODES, 'openings': NODES}  # and how many numbers each has
+LOWEST = 1e-3  # of a K_m
+TINY = 1e-9  # of an error or opening
 
 
 class Origin(NamedTuple):
@@ -70,7 +75,7 @@ def parts_of(path: Path | str) -> dict[str, Saved]:
     return parts
 
 
-def read_twin(path: Path | str) -> LuGreActuator:
+def read_twin(path: Path | str) -> TwinActuator:
     """
     Read a twin.
 
@@ -81,7 +86,7 @@ def read_twin(path: Path | str) -> LuGreActuator:
     return twin_of(parts_of(path)[ENTRY], f'{path}')
 
 
-def twin_of(entry: Saved, where: str) -> LuGreActuator:
+def twin_of(entry: Saved, where: str) -> TwinActuator:
     """
     Make the actuator of a twin.
 
@@ -90,13 +95,19 @@ def twin_of(entry: Saved, where: str) -> LuGreActuator:
     :return: the constants of the model.
     :raises ValueError: naming every constant that is missing, unknown or wrong.
     """
-    known = {field.name for field in fields(LuGreActuator)}
-    values, wrong = {}, []
+    known = {field.name for field in fields(TwinActuator)}
+    values: dict[str, float] = {}
+    tables: dict[str, tuple[float, ...]] = {}
+    wrong = []
     for name, value in entry.items():
         if name in OF_FILE:
             continue
         if name not in known:
             wrong.append(f'{name} is no constant of the model')
+        if name in TABLES:
+            tables[name], problem = table_of(name, value)
+            wrong += problem
+            continue
         number = -1.0
         if isinstance(value, (int, float)) and not isinstance(value, bool):
             number = float(value)
@@ -107,6 +118,37 @@ def twin_of(entry: Saved, where: str) -> LuGreActuator:
     for name in ('stroke', 'mass', 'stiffness', 'area', 'dead_volume', 'supply', 'coulomb'):
         if not values.get(name):
             wrong.append(f'{name} is missing')
+    if ('errors' in tables) != ('openings' in tables):
+        wrong.append('errors and openings belong together')
     if wrong:
         raise ValueError(f'{where}: {"; ".join(wrong)}')
-    return LuGreActuator(**values)
+    return TwinActuator(
+        **values,
+        recovery=tables.get('recovery', RECOVERY),
+        errors=tables.get('errors', ()),
+        openings=tables.get('openings', ()),
+    )
+
+
+def table_of(name: str, value: Plain) -> tuple[tuple[float, ...], list[str]]:
+    """
+    Read one table of a twin.
+
+    :param name: one of TABLES.
+    :param value: of the file.
+    :return: its numbers, and what is wrong with them.
+    """
+    count, numbers = TABLES[name], np.zeros(0)
+    if isinstance(value, list) and all(type(v) in (int, float) for v in value):
+        numbers = np.array([float(f'{v}') for v in value])
+    good = len(numbers) == count and bool(np.isfinite(numbers).all())
+    if good and name == 'recovery':
+        good = bool((numbers >= LOWEST).all())
+    elif good:
+        rising = np.diff(numbers) if name == 'openings' else np.diff(numbers) - TINY
+        good = bool((rising >= 0.0).all()) and abs(numbers[count // 2]) < TINY
+        good = good and (name != 'openings' or float(np.abs(numbers).max()) <= 1.0)
+    if good:
+        return tuple(float(v) for v in numbers), []
+    what = 'positive' if name == 'recovery' else 'rising and 0 in their middle'
+    return (), [f'{name} is not {count} numbers, {what}']

@@ -16,7 +16,7 @@ from damadics_fd.commands.commission.control_room import identify as identify_sc
 from damadics_fd.commands.commission.errors import CommissioningError
 from damadics_fd.commands.commission.monitor import identify
 from damadics_fd.commands.commission.plot import draw
-from damadics_fd.commands.commission.twin import model, write_twin
+from damadics_fd.commands.commission.twin.constants import model, write_twin
 from damadics_fd.commands.commission.valve_file import parameter_file
 from damadics_fd.commands.many_valves import (
     by_valve,

@@ -3,12 +3,13 @@
 """Identify a valve for mode monitor: settings, verdict, and what they rest on."""
 
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from damadics_fd.commands.commission.balance import BLOCK, Balance, find_balance
+from damadics_fd.commands.commission.breakaway import breakaway
 from damadics_fd.commands.commission.checks import (
     check_directions,
     check_units,
@@ -121,6 +122,13 @@ def identify(
     dead = dead_signals(recordings)
     balance = find_balance(signals, base, given, pressures=not dead)
     _same_valve(recordings, base, given)
+    if 'hysteresis' not in given:
+        start = breakaway(signals, balance.settings, balance.friction)
+        settings = balance.settings.replace(
+            hysteresis=float(f'{start.hysteresis:.3g}'),
+            hysteresis_std=float(f'{start.hysteresis_std:.2g}'),
+        )
+        balance = replace(balance, settings=settings)
     return _propose(recordings, base, given, days, balance, dead)
 
 
@@ -295,6 +303,11 @@ def report(proposal: Proposal) -> Iterator[str]:
         f'{2 * b.viscous_std:.0f} N s/m, {b.stribeck:.1f} N more where it sticks; the balance '
         f'leaves {b.misfit:.1f} N ({100.0 * b.misfit / max(b.total, 1e-9):.0f} % of the friction)'
     )
+    if s.hysteresis > 0.0:
+        yield (
+            f'{s.hysteresis:.1f} +- {2 * s.hysteresis_std:.1f} N of it is hysteresis of the '
+            'diaphragm or play, which shares of the friction do not count'
+        )
     if s.plug_diameter > 0.0:
         yield (
             f'plug force {b.gain:.2f} of the table, shape +-{100.0 * b.shape:.0f} %; '

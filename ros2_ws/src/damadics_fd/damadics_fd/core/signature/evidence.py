@@ -28,6 +28,7 @@ from damadics_fd.core.signature.state import (
     SIGN_T,
     SMALL_FRICTION,
     SPRING,
+    STRIBECK,
     TABLE,
     X1,
     X1_T,
@@ -80,7 +81,7 @@ def eliminate_reference(s: State, m: int, iv: float) -> float:
     for i in range(N_REF):
         J_0 -= y0[i] * y0[i]
     for i in range(N_COL):
-        if TABLE <= i < N_REF:
+        if TABLE <= i < STRIBECK:
             continue
         g = iv * q[i]
         for k in range(N_REF):
@@ -155,14 +156,14 @@ def combine(
     Return the change first d0 + a d1 + b d2 of the last group in units of `scale`.
 
     :param s: state record after `solve_group`.
-    :param count: number of columns.
+    :param count: number of columns; a fourth is not counted.
     :param first: weight of the first column.
     :param a: weight of the second column.
     :param b: weight of the third column.
     :param scale: unit.
     :return: value and standard deviation.
     """
-    weight = (first, a, b)
+    weight = (first, a, b, 0.0)
     value, variance = 0.0, 0.0
     for i in range(count):
         value += weight[i] * s.work.d[i]
@@ -179,7 +180,7 @@ def share_friction(s: State, m: int, count: int, third: float) -> float:
     :param s: state record after `solve_group`; value, sd, dry and apart of the set are written.
     :param m: index of the set.
     :param count: number of columns.
-    :param third: weight of the third column: the time of what grows, 0 of an offset.
+    :param third: weight of the third column: the time of what grows, 0 of what does not count.
     :return: friction at the mean speed, the unit of the value [1].
     """
     v_mean = s.vb[m] / s.ne[m]
@@ -229,7 +230,6 @@ def evaluate(s: State, c: SignatureSettings, m: int, eps: float, b_r: float, b_p
     logp, value, std = s.logp[m], s.value[m], s.sd[m]
     logp[0] = J_0  # first the misfits J_h
     now = growth_time(s)
-    # friction: dry and viscous part together
     count = 3 if m == SET_ALARM else 2
     explained = solve_group(
         s, m, iv, FRICTION_COLUMNS, count, (c.change_std[1], c.change_std[0], c.growth_std[0], 1.0)

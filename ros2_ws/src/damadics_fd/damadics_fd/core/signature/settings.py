@@ -59,6 +59,8 @@ class SignatureSettings(Section):
     stribeck_std: float = 0.01  # [1] prior of the friction that vanishes with speed
     ps_lag: float = 0.0  # [s] of the chamber pressure, to which position and P1 - P2 were delayed
     ps_lag_std: float = 0.0  # [s] how well the lag of the chamber pressure is known
+    hysteresis: float = 0.0  # [1] of the learned dry friction, what is none
+    hysteresis_std: float = 0.0  # [1] how well that is known
     size_weight: float = 5000.0  # blocks that the unit of a size rests on in the end
     sigma_min: float = 4e-4  # [1]
     # verification
@@ -121,6 +123,8 @@ class SignatureSettings(Section):
             plug_shape_std=c.plug_shape_std,
             ps_lag=c.ps_lag,
             ps_lag_std=c.ps_lag_std,
+            hysteresis=c.hysteresis / (c.stiffness * c.stroke),
+            hysteresis_std=c.hysteresis_std / (c.stiffness * c.stroke),
             material_friction=c.material_friction,
             material_spring=c.material_spring,
             material_supply=c.material_supply,

@@ -37,11 +37,13 @@ from damadics_fd.core.signature.sums import precision
 
 UNKNOWN = 0.2  # relative deviation of the unit from which no size is stated
 LARGE = 1.0  # friction change that is stated only if it is known as well itself
-APART = 4.0  # deviations by which dry and viscous friction must have changed differently
+# deviations, and share of the change, by which dry and viscous friction must change differently
+APART, APART_SHARE = 4.0, 0.06
 # what a size is in error because no valve rubs and springs as the model says, as a share of it
 MODEL_FRICTION, MODEL_SPRING = 0.08, 0.02
+PLAY = 0.00125  # [1] half the play of a position sensor, which passes for friction
 STICK_SLIP = 0.15  # the same of friction, of a stem that only sticks and slips
-FRICTION_SIZE = np.array([SIGN, V, ONE])
+FRICTION_SIZE = np.array([SIGN, V, STRIBECK, ONE])
 SPRING_SIZE = np.array([X1, ONE])
 ONE_WAY = 0.3  # of a friction change: how much more of it one way than on the mean
 SHOWN, MATTERS = 25.0, 0.2  # evidence, and share of the change, from which it is taken in
@@ -142,22 +144,25 @@ def physical_value(s: State, c: SignatureSettings, m: int, h: int) -> tuple[floa
     if h == FRICTION:
         v = s.vb[m] / max(s.ne[m], 1.0)
         F = friction_at(s.theta, v)
-        F_unit = friction_at(s.unit, v)
+        F_unit = max(friction_at(s.unit, v) - c.hysteresis, SMALL_FRICTION)
         cov = s.unit_cov
+        other = c.hysteresis_std * c.hysteresis_std + PLAY * PLAY
         variance = cov[SIGN, SIGN] + 2.0 * v * cov[V, SIGN] + v * v * cov[V, V]
         late = v * s.unit[X1] * c.ps_lag_std  # friction that a lag not known would show
-        variance += late * late
+        variance += late * late + other
         error = friction_error(s, m)
         if variance + (error * F_unit) ** 2 > (UNKNOWN * F_unit) ** 2:
             return math.nan, math.nan
         # the dry part leads where its share is the larger one
         beyond = s.apart[m] if value >= 0.0 else -s.apart[m]
-        told = beyond > APART * s.apart_sd[m] and m == SET_SLOW
-        F_dry = max(s.unit[SIGN], SMALL_FRICTION)
+        least = max(APART * s.apart_sd[m], APART_SHARE * abs(value))
+        told = beyond > least and m == SET_SLOW
+        F_dry = max(s.unit[SIGN] - c.hysteresis, SMALL_FRICTION)
+        dry_variance = cov[SIGN, SIGN] + other
         leads = abs(s.dry[m]) * F_dry > 0.5 * abs(value) * F_unit
-        if told and leads and cov[SIGN, SIGN] < (UNKNOWN * F_dry) ** 2:
+        if told and leads and dry_variance < (UNKNOWN * F_dry) ** 2:
             ratio = max(s.theta[SIGN], SMALL_FRICTION) / F_dry
-            known = cov[SIGN, SIGN] / (F_dry * F_dry) + error * error
+            known = dry_variance / (F_dry * F_dry) + error * error
             return in_units(s.dry[m], s.dry_sd[m], ratio, known)
         std = math.sqrt(std * std + s.apart_sd[m] * s.apart_sd[m])
         known = variance / (F_unit * F_unit) + error * error
@@ -183,10 +188,12 @@ def physical_value(s: State, c: SignatureSettings, m: int, h: int) -> tuple[floa
 @jit
 def size_beside_offset(s: State, c: SignatureSettings, m: int, eps: float) -> None:
     """
-    Size friction and spring anew, each with an offset beside it, friction if the record shows one.
+    Size friction and spring anew, with what else a valve's friction may do beside them.
 
-    A valve that rubs more one way pushes as well, and passes for one with more preload, which a
-    spring's change would have to hold. Evidence and posteriors stay those of the plain change.
+    Friction that has grown has grown at low speed as well, where it would pass for more dry and
+    less viscous friction. A valve that rubs more one way pushes as well, and passes for one with
+    more preload, which a spring's change would have to hold; beside friction such an offset is
+    taken in if the record shows one. Evidence and posteriors stay those of the plain change.
 
     :param s: state record after `evaluate` of the set; friction and spring are written.
     :param c: settings record.
@@ -195,11 +202,17 @@ def size_beside_offset(s: State, c: SignatureSettings, m: int, eps: float) -> No
     """
     iv = precision(s, m, eps)
     change = abs(s.value[m][FRICTION]) * friction_at(s.theta, s.vb[m] / s.ne[m])
-    prior = (c.change_std[1], c.change_std[0], max(ONE_WAY * change, SMALL_FRICTION), 1.0)
-    alike = solve_group(s, m, iv, FRICTION_SIZE, 2, prior)
-    more = solve_group(s, m, iv, FRICTION_SIZE, 3, prior) - alike
-    if alike >= 0.0 and more > SHOWN and abs(s.work.d[2]) > MATTERS * change:
-        share_friction(s, m, 3, 0.0)
+    offset = max(ONE_WAY * change, SMALL_FRICTION)
+    prior = (c.change_std[1], c.change_std[0], max(change, SMALL_FRICTION), offset)
+    aside = solve_group(s, m, iv, FRICTION_SIZE, 4, prior)
+    one_way = abs(s.work.d[3]) > MATTERS * change
+    alike = solve_group(s, m, iv, FRICTION_SIZE, 3, prior)
+    if alike >= 0.0:
+        if one_way and aside - alike > SHOWN:
+            solve_group(s, m, iv, FRICTION_SIZE, 4, prior)
+            share_friction(s, m, 4, 0.0)
+        else:
+            share_friction(s, m, 3, 0.0)
     prior = (c.change_std[2], ASIDE, 1.0, 1.0)
     if solve_group(s, m, iv, SPRING_SIZE, len(SPRING_SIZE), prior) >= 0.0:
         share_spring(s, m, len(SPRING_SIZE), 0.0)

@@ -50,6 +50,12 @@ class Valve(Section):
     area: float = number('m2', 'effective area of the diaphragm', 1e-6, 10.0, 0.029)
     viscous: float = number('N s/m', 'viscous friction of the stem', 0.0, 1e9, 1500.0)
     stem_play: float = number('', 'play of the stem / stroke, its dry friction', 0.0, 0.5, 0.01)
+    hysteresis: float = number(
+        'N', 'hysteresis of the diaphragm, which a moving stem shows as friction', 0.0, 1e9, 0.0
+    )
+    hysteresis_std: float = number(
+        'N', 'how well that hysteresis is known: its standard deviation', 0.0, 1e9, 0.0
+    )
 
     # plug and flow
     plug_diameter: float = number('m', 'plug diameter', 0.0, 2.0, 0.05)

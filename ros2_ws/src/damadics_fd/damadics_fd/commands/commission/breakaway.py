@@ -1,0 +1,141 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""
+The force at which a stem leaves its place: static friction, and what is none.
+
+A stem that goes on in the direction it came from bears its static friction. One that turns back
+has the hysteresis of the diaphragm on its side first: it leaves at twice the hysteresis less.
+While it moves, hysteresis cannot be told from dry friction.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from damadics_fd.commands.commission.lag import Mask, plug_per_pascal
+from damadics_fd.commands.commission.signals import Blocks, Signals, blocks
+from damadics_fd.core.approximator.transmitter import delay_column
+from damadics_fd.core.record import Floats
+from damadics_fd.core.settings import Settings
+
+SHORT = 0.05  # s
+AWAY = 4.0  # deviations of the noise by which a stem has left its place
+TRAVEL, BACK = 0.02, 0.001  # strokes of travel that give a direction, and what undoes them
+REACH = 60.0  # s that are looked back for it
+STARTS = 8  # each way, that are needed
+CLEARLY = 3.0  # deviations from which a hysteresis is one
+LEAST = 0.1  # of the friction: less is within what the model of friction leaves open
+UNSURE, MODEL = 0.15, 0.02  # deviation as a share of the hysteresis, and of the friction
+
+
+class Breakaway(NamedTuple):
+    """What a stem bears when it begins to move."""
+
+    force: float  # [N] the median; 0 where no stroke began in mid-stroke
+    hysteresis: float  # [N] of the diaphragm; 0 where none is seen
+    hysteresis_std: float  # [N]
+
+
+def breakaway(signals: Signals, s: Settings, friction: float) -> Breakaway:
+    """
+    Return the friction that the stem overcomes when it begins to move.
+
+    While it stands the force rises by itself; a line through the last tenth of a second tells
+    what it was when the stem left its place. By the time that it is seen to have left it, the
+    diaphragm has given already: of its hysteresis the force at the onset of the motion tells.
+
+    :param signals: the samples.
+    :param s: settings with what commission found.
+    :param friction: dry friction of the moving stem, hysteresis included [N].
+    :return: what was found.
+    """
+    b = blocks(signals, SHORT, s.ps_lag)
+    x, dp = signals.x, signals.dp
+    if s.ps_lag > 0.0:
+        dt = np.diff(signals.t, prepend=-np.inf)
+        x, dp = delay_column(x, dt, s.ps_lag), delay_column(dp, dt, s.ps_lag)
+    noise = 1.4826 * float(np.median(np.abs(np.diff(x, 3)))) / np.sqrt(20.0)
+    borne, starts = [], []
+    whole = b.index[2:] - b.index[:-2] == 2
+    for k in np.flatnonzero(b.standing[:-2] & b.moving[2:] & whole):
+        first, last = np.searchsorted(signals.t, b.t[k] + np.array([-3.5, 2.5]) * SHORT)
+        t, xs = signals.t[first:last], x[first:last]
+        still = (t < b.t[k]) & (t >= b.t[k] - 1.5 * SHORT)
+        if still.sum() < 4:
+            continue
+        place, way = float(np.mean(xs[still])), float(np.sign(b.v[k + 2]))
+        left = int(np.argmax(_twice((xs - place) * way > AWAY * noise) & (t >= b.t[k])))
+        plug = float(plug_per_pascal(s, np.array([place]))[0]) * dp[first:last]
+        force = s.mass * s.gravity + s.signed_area * signals.ps[first:last]
+        force -= (plug if s.flow_to == 'open' else -plug) + s.stiffness * s.stroke * (
+            place + s.spring_origin
+        )
+        near = t >= b.t[k] - 1.5 * SHORT
+        seen = _force_before(t[near], force[near] * way, float(t[left]))
+        if left == 0 or np.isnan(seen):
+            continue
+        borne.append(seen)
+        speed = np.polyfit(t[left:], xs[left:] * way, 1)[0] if len(t) - left > 2 else 0.0
+        onset = float(t[left]) - min(AWAY * noise / max(float(speed), 1e-9), 2.0 * SHORT)
+        starts.append((_force_before(t, force * way, onset), came_from(b, int(k), place) * way))
+    if not borne:
+        return Breakaway(0.0, 0.0, 0.0)
+    forces, ways = np.array([start for start in starts if np.isfinite(start[0])]).reshape(-1, 2).T
+    found = hysteresis(forces[ways > 0.0], forces[ways < 0.0], friction)
+    return Breakaway(max(float(np.median(borne)), 0.0), *found)
+
+
+def _twice(away: Mask) -> Mask:
+    both: Mask = away & np.append(away[1:], False)
+    return both
+
+
+def _force_before(t: Floats, force: Floats, at: float) -> float:
+    """Return the force at an instant, by a line through the tenth of a second before it."""
+    before = (t < at - 0.1 * SHORT) & (t >= at - 2.0 * SHORT)
+    if before.sum() < 4:
+        return float('nan')
+    return float(np.polyfit(t[before] - at, force[before], 1)[1])
+
+
+def came_from(b: Blocks, k: int, place: float) -> float:
+    """
+    Tell in which direction the stem came to a place.
+
+    :param b: blocks of the recording.
+    :param k: index of the one in which it stands there.
+    :param place: position / stroke.
+    :return: 1 closing, -1 opening, 0 where it went to and fro.
+    """
+    past = b.x[max(k - round(REACH / b.width), 0) : k] - place
+    far = np.flatnonzero(np.abs(past) > TRAVEL)
+    if not len(far):
+        return 0.0
+    way = -float(np.sign(past[far[-1]]))
+    beyond = float(np.max(past[far[-1] :] * way))
+    return way if beyond < BACK else 0.0
+
+
+def hysteresis(going_on: Floats, turning: Floats, friction: float) -> tuple[float, float]:
+    """
+    Tell the hysteresis of the diaphragm from the forces at which strokes begin.
+
+    :param going_on: forces of strokes that go on in the direction the stem came from [N].
+    :param turning: of strokes that turn back [N].
+    :param friction: dry friction of the moving stem, hysteresis included [N].
+    :return: hysteresis and its deviation [N]; 0, 0 where none is seen.
+    """
+    if min(len(going_on), len(turning)) < STARTS:
+        return 0.0, 0.0
+
+    def middle(forces: Floats) -> tuple[float, float]:
+        median = float(np.median(forces))
+        spread = 1.86 * float(np.median(np.abs(forces - median)))
+        return median, spread / float(np.sqrt(len(forces)))
+
+    (on, on_std), (back, back_std) = middle(going_on), middle(turning)
+    found, std = 0.5 * (on - back), 0.5 * float(np.hypot(on_std, back_std))
+    if found < LEAST * friction or found < CLEARLY * std:
+        return 0.0, 0.0
+    found = min(found, friction)
+    return found, float(np.sqrt(std**2 + (UNSURE * found) ** 2 + (MODEL * friction) ** 2))
