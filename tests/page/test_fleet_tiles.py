@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the page tells a browser of a large fleet, without ROS and without a browser."""
 
+import array
 import json
 import math
 
@@ -61,6 +62,22 @@ def test_of_a_large_fleet_only_tiles_with_other_words_travel(fleet_of_200):
     now = 21.0
     overview.look(now)
     assert tiles.news() == {'tiles': {}}, 'silence goes on'
+
+
+def test_the_learning_of_a_large_fleet_is_told_in_steps(fleet_of_200):
+    valves, status, tell = fleet_of_200
+    overview = Overview(valves, lambda: 1_700_000_000 * 10**9 + int(now * 1e9))
+    tiles = Tiles(overview, texts('en'))
+    told = 0
+    for n in range(100):
+        now = 10.0 + n
+        status.state[:] = array.array('B', [FaultFlag.STATE_LEARNING] * 200)
+        status.progress[:] = array.array('d', [n / 100] * 200)
+        tell(now)
+        overview.look(now)
+        told += len(tiles.news()['tiles'])
+    assert told == 20 * 200
+    assert {tile['progress'] for tile in tiles._told.values()} == {0.95}
 
 
 def test_a_status_with_odd_numbers_breaks_no_tile(fleet_of_200):

@@ -21,10 +21,11 @@ from damadics_dashboard.words.valve_words import address, area_of, headline, of_
 PERIOD = 0.2  # s
 ABOVE = 30  # valves from which on alarms stand above the tiles: nobody scrolls past so many
 LARGE = 100  # valves from which on the page is drawn twice a second
+STEPS = 20  # in which the learning of the valves of a large fleet is told
 EVERY = 0.9  # s at least between two times that ages and residuals of a large fleet are told
 KINDS = ('F', 'S', 'M', 'C', 'off', 'learn', 'ok')
 START = 'ros2 run damadics_bringup run --simulate'
-Brief = tuple[str, str, str, str, Place]
+Brief = tuple[str, str, str, int, str, Place]
 
 
 class Tile(TypedDict):
@@ -132,12 +133,14 @@ class Tiles:
         """
         overview, now, clock = self._overview, self._overview.looked, self._overview.clock
         changed: dict[str, Tile] = {}
-        places = overview.places
+        places, steps = overview.places, STEPS * (len(overview.valves) > LARGE)
         for valve, condition, place in zip(
             overview.valves, overview.conditions, places, strict=True
         ):
             name = valve.name
-            brief = brief_of(valve, condition, place) if name not in overview.alarms else None
+            brief = None
+            if name not in overview.alarms:
+                brief = brief_of(valve, condition, place, steps if valve.fleet else 0)
             if brief is not None:  # as nearly all of a large fleet
                 if self._brief.get(name) == brief:
                     continue
@@ -154,18 +157,22 @@ class Tiles:
         return news
 
 
-def brief_of(valve: Valve, condition: Condition, place: Place) -> Brief | None:
+def brief_of(valve: Valve, condition: Condition, place: Place, steps: int) -> Brief | None:
     """
     Return what the words on a tile without an alarm depend on.
 
     :param valve: the valve.
     :param condition: of it.
     :param place: area and title.
+    :param steps: in which learning is told; 0: as it goes on.
     :return: it; None where they depend on more.
     """
-    if condition.kind == 'ok' or (condition.kind == 'off' and not math.isnan(condition.value)):
-        return condition.kind, condition.title, condition.detail, valve.tag, place
-    return None
+    learned = 0
+    if condition.kind == 'learn' and steps:
+        learned = int(steps * condition.value)
+    elif condition.kind != 'ok' and (condition.kind != 'off' or math.isnan(condition.value)):
+        return None
+    return condition.kind, condition.title, condition.detail, learned, valve.tag, place
 
 
 def tile(valve: Valve, t: Texts, now: float, clock: int) -> Tile:
