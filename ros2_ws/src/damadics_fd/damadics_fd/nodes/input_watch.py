@@ -198,7 +198,7 @@ class InputWatch:
         if now - self._counted > COUNTED_EVERY:
             with self._node.handle:  # the name is resolved: half the cost
                 count = self._node.handle.get_count_publishers(self._name)
-            self._publishers, self._counted = int(count), now
+            self._publishers, self._counted = count, now
         return self._publishers
 
     @property
