@@ -4,7 +4,7 @@
 
 import numpy as np
 import pytest
-from damadics_fd.core.approximator import observer, velocity
+from damadics_fd.core.approximator import network, observer, velocity
 from damadics_fd.core.approximator.estimator import Estimator
 from damadics_fd.core.approximator.network import sigmoids
 from damadics_fd.core.approximator.state import State
@@ -30,7 +30,7 @@ def unit_steps(state, settings, y, u, learning, xi2):
     for k in range(len(y)):
         velocity.filter_position(s, c, c.dt, y[k])
         velocity.filter_input(s, c, c.dt, u[k])
-        observer.observe(s, c, c.dt, s.x1, s.x2, s.u)
+        observer.observe(s, c, c.dt, network.sigmoids(s.x2), s.x1, s.x2, s.u)
         xi2[k] = s.xi2
         if learning:
             observer.adapt_alpha(s, c, c.dt, s.x1, s.u)

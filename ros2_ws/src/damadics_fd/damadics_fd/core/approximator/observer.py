@@ -43,18 +43,27 @@ def restart(s: Observer, x1: float) -> None:
 
 
 @jit
-def observe(s: Observer, c: Settings, dt: float, x1: float, x2: float, u: float) -> None:
+def observe(
+    s: Observer,
+    c: Settings,
+    dt: float,
+    terms: tuple[float, float, float],
+    x1: float,
+    x2: float,
+    u: float,
+) -> None:
     """
     Advance the observer (10), (11) by backward Euler in closed form: stable at any dt.
 
     :param s: state record: xh1, xh2 in and out; xi1, xi2 [1/s], phi = Phi [1/s2] out.
     :param c: settings record.
     :param dt: time step [s].
+    :param terms: what `network.sigmoids` returns for x2.
     :param x1: position [1].
     :param x2: velocity [1/s].
     :param u: input [1].
     """
-    network.regress(s, network.sigmoids(x2))
+    network.regress(s, terms)
     s.phi = network.bound(s, x2)
     P = abs(s.phi)
     den = 1.0 + dt * (s.ah1 + c.k2)
@@ -112,6 +121,7 @@ def observe_printed(
     s: Observer,
     c: Settings,
     dt: float,
+    terms: tuple[float, float, float],
     x1_0: float,
     x2_0: float,
     u_0: float,
@@ -130,6 +140,7 @@ def observe_printed(
     :param s: state record as in `observe`; phi is that of the sample before on entry.
     :param c: settings record.
     :param dt: time step [s]; k2 dt must stay below 2.5.
+    :param terms: what `network.sigmoids` returns for x2.
     :param x1_0: position at the sample before [1].
     :param x2_0: velocity there [1/s].
     :param u_0: input there [1].
@@ -137,7 +148,6 @@ def observe_printed(
     :param x2: velocity [1/s].
     :param u: input [1].
     """
-    terms = network.sigmoids(x2)  # first, while there is no other number to be kept over the calls
     phi_0 = network.bound(s, x2_0)  # with the regressors of then and the weights of now
     network.regress(s, terms)
     s.phi = network.bound(s, x2)

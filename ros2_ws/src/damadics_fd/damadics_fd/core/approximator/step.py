@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damadics_fd.core import quality
-from damadics_fd.core.approximator import learning, observer, transmitter, velocity
+from damadics_fd.core.approximator import learning, network, observer, transmitter, velocity
 from damadics_fd.core.approximator.state import Estimate, State
 from damadics_fd.core.jit import jit, layer
 from damadics_fd.core.modes import MONITOR, PAPER, PHASE_PAPER
@@ -19,12 +19,30 @@ SUBSTEPS = 1000  # at most, in one gap
 LARGEST_PART = 1.5  # of a sample period, and of 1/k2: the printed observer is unstable from 2.8 on
 
 
+@jit
+def between(before: float, now: float, i: int, parts: int) -> float:
+    """
+    Return a signal at the end of a part of the step, on a straight line.
+
+    :param before: the signal at the start of the step.
+    :param now: the signal at its end.
+    :param i: number of the part, from 1.
+    :param parts: number of all parts.
+    :return: the signal.
+    """
+    if i >= parts:
+        return now
+    part = 0.5 if parts == 2 else i / parts  # a division saved nearly always
+    return before + part * (now - before)
+
+
 @layer
 def advance(
     s: State,
     c: Settings,
     phase: int,
     dt: float,
+    terms: tuple[float, float, float],
     x1_0: float,
     x2_0: float,
     u_0: float,
@@ -39,6 +57,7 @@ def advance(
     :param c: settings record.
     :param phase: phase of the estimator.
     :param dt: time step [s].
+    :param terms: sigmoids of the velocity at the end of the step.
     :param x1_0: position at the start of the step, filtered [1].
     :param x2_0: velocity there [1/s].
     :param u_0: input there, filtered [1].
@@ -47,9 +66,9 @@ def advance(
     :param u: input there, filtered [1].
     """
     if phase == PHASE_PAPER:
-        observer.observe_printed(s, c, dt, x1_0, x2_0, u_0, x1, x2, u)
+        observer.observe_printed(s, c, dt, terms, x1_0, x2_0, u_0, x1, x2, u)
     else:
-        observer.observe(s, c, dt, x1, x2, u)
+        observer.observe(s, c, dt, terms, x1, x2, u)
     learning.adapt(s, c, phase, dt, x1, x2, u)
 
 
@@ -122,17 +141,24 @@ def step(
     periods = dt * c.sample_rate
     if c.mode_code == PAPER:
         periods = max(periods, dt * c.k2)
-    parts = 1 if periods < LARGEST_PART else min(int(periods / LARGEST_PART) + 1, SUBSTEPS)
-    length = dt / parts if parts > 1 else dt  # a division saved nearly always
+    parts, length = 1, dt
+    if periods >= 2.0 * LARGEST_PART:
+        parts = min(int(periods / LARGEST_PART) + 1, SUBSTEPS)
+        length = dt / parts
+    elif periods >= LARGEST_PART:
+        parts, length = 2, 0.5 * dt
     x1_0, x2_0, u_0 = x1_before, x2_before, u_before
+    # the sigmoids one part ahead: they take as long as the rest of a part, and wait for nothing
+    ahead = network.sigmoids(between(x2_before, s.x2, 1, parts))
     for i in range(1, parts + 1):  # a gap is bridged on straight lines between filtered signals
+        terms = ahead
         x1_1, x2_1, u_1 = s.x1, s.x2, s.u
         if i < parts:
-            part = i / parts
-            x1_1 = x1_before + part * (s.x1 - x1_before)
-            x2_1 = x2_before + part * (s.x2 - x2_before)
-            u_1 = u_before + part * (s.u - u_before)
-        advance(s, c, phase, length, x1_0, x2_0, u_0, x1_1, x2_1, u_1)
+            x1_1 = between(x1_before, s.x1, i, parts)
+            x2_1 = between(x2_before, s.x2, i, parts)
+            u_1 = between(u_before, s.u, i, parts)
+            ahead = network.sigmoids(between(x2_before, s.x2, i + 1, parts))
+        advance(s, c, phase, length, terms, x1_0, x2_0, u_0, x1_1, x2_1, u_1)
         x1_0, x2_0, u_0 = x1_1, x2_1, u_1
 
     learning.follow(s, c, phase, dt)

@@ -8,12 +8,8 @@ import numpy as np
 
 from damadics_fd.core.jit import jit
 from damadics_fd.core.record import Floats
-from damadics_fd.core.signature.evidence import (
-    eliminate_reference,
-    share_friction,
-    share_spring,
-    solve_group,
-)
+from damadics_fd.core.signature.elimination import eliminate_reference, solve_group
+from damadics_fd.core.signature.evidence import share_friction, share_spring
 from damadics_fd.core.signature.settings import SignatureSettings
 from damadics_fd.core.signature.sliding import STICKY_DOUBT
 from damadics_fd.core.signature.state import (
