@@ -222,3 +222,6 @@ def _note_channels(
     for channel in file.channels.values():
         if channel.topic == name and channel.id not in decoders:
             decoders[channel.id] = Decoder(file, channel.id, fields)
+    kinds = sorted({decoder.kind for decoder in decoders.values()})
+    if len(kinds) > 1:
+        raise BagError(f'{name} holds messages of several types: {", ".join(kinds)}', file.path)

@@ -61,8 +61,9 @@ class Decoder:
             raise BagError(f'{channel.topic} has no {" or ".join(PARSERS)} definition', mcap.path)
         try:
             parse = PARSERS[schema.encoding]
-            self.definition: Definition = parse(schema.name, schema.data.decode())
-        except (BagError, UnicodeDecodeError) as error:
+            text = schema.data.decode('utf-8', 'replace').replace('\ufeff', '')
+            self.definition: Definition = parse(schema.name, text)
+        except BagError as error:
             raise BagError(f'{channel.topic}: {error}', mcap.path) from error
         self.kind = next(iter(self.definition))  # a foreign name may stand in another form
         self._layouts: list[Layout] = []

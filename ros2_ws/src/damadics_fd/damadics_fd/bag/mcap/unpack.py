@@ -87,25 +87,33 @@ class Slot:
         return len(plain)
 
     def _unzstd(self, packed: memoryview, data: memoryview) -> int:
-        stated = zstandard.frame_content_size(packed)
-        if stated not in (len(data), -1):
-            return stated
-        reader = self._zstd.stream_reader(packed)  # decompresses right into `data`
+        one = zstandard.frame_content_size(packed) == len(data)  # nearly always; else any number
+        reader = self._zstd.stream_reader(packed, read_across_frames=not one)
         done = 0
         while done < len(data) and (count := reader.readinto(data[done:])):
-            done += count
-        return done + len(reader.read(1)) if stated == -1 else done
+            done += count  # decompressed right into `data`
+        return done if one else done + len(reader.read(1))
 
 
 def _lz4(packed: memoryview, size: int) -> bytes:
+    """Decompress frames one after the other, to at most one byte more than there should be."""
     try:
         import lz4.frame
     except ImportError as error:
         raise BagError('a chunk is compressed by lz4: pip install lz4') from error
+    frames = lz4.frame.create_decompression_context()
+    parts: list[bytes] = []
+    at, left = 0, size + 1
     try:
-        return bytes(lz4.frame.LZ4FrameDecompressor().decompress(packed, max_length=size))
+        while at < len(packed) and left:
+            part, read, _ = lz4.frame.decompress_chunk(frames, packed[at:], max_length=left)
+            if not (part or read):
+                break
+            parts.append(part)
+            at, left = at + read, left - len(part)
     except RuntimeError as error:
         raise BagError('a chunk is damaged: it cannot be decompressed') from error
+    return b''.join(parts)
 
 
 def open_plain(path: Path, limits: Limits) -> BinaryIO:

@@ -14,6 +14,7 @@ from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.mapping import Scale, Source
 from damadics_fd.bag.tables.assignment import NANOSECONDS, SECOND, Assignment, assign
 from damadics_fd.bag.tables.headers import headers
+from damadics_fd.bag.tables.sniff import parse_cell
 from damadics_fd.bag.tables.table import ROWS, Table, Told, lacking
 from damadics_fd.bag.tables.times import Dates, seconds_of
 
@@ -83,8 +84,18 @@ class ParquetTable(Table):
                         if not len(batch):
                             continue
                     for name, use in signals.items():
-                        columns[name] = use.scale(_numbers(self._column(batch, use.column)))
+                        columns[name] = use.scale(self._values(batch, use.column))
                     time = _time([self._column(batch, i) for i in self.assignment.time])
+                    if pyarrow.types.is_timestamp(time.type) and time.null_count:
+                        known = np.array(time.is_valid().to_numpy(zero_copy_only=False), bool)
+                        on_problem(
+                            f'{self.path}: {time.null_count} rows up to row {row} have no time'
+                            ' and are left out'
+                        )
+                        columns = {name: values[known] for name, values in columns.items()}
+                        time = time.drop_null()
+                        if not len(time):
+                            continue
                     exact = _exact(time, self.assignment.scale == NANOSECONDS)
                     if exact is not None:
                         yield columns | {'stamp': exact}
@@ -101,6 +112,25 @@ class ParquetTable(Table):
         name = self.names[column]
         there = [i for i, other in enumerate(batch.schema.names) if other == name]
         return batch.column(there[self.names[:column].count(name)])
+
+    def _values(self, batch: 'pyarrow.RecordBatch', column: int) -> NDArray[np.float64]:
+        """Return a column as numbers, text as a spreadsheet may write them."""
+        there = self._column(batch, column)
+        if pyarrow.types.is_dictionary(there.type):
+            there = there.dictionary_decode()
+        try:
+            return _numbers(there)
+        except pyarrow.ArrowException as error:
+            try:
+                if not _is_text(there.type):
+                    raise ValueError(f'{there.type}') from error
+                texts = there.to_pylist()
+                return np.array([np.nan if text is None else parse_cell(text) for text in texts])
+            except ValueError as other:
+                name = self.names[column]
+                raise BagError(
+                    f'the column {name} holds no numbers: {other}', self.path
+                ) from error
 
     def _stamps(self, time: 'pyarrow.Array') -> NDArray[np.float64]:
         """Return times [ns] that are numbers or text, NaN where there is none."""

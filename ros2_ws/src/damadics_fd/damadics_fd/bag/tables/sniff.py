@@ -4,6 +4,7 @@
 
 import csv
 import math
+import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,13 +18,22 @@ LINES = 400  # looked at
 PREAMBLE = 100  # lines at most
 BLANKS = ' '  # any number of blanks and tabs, as MATLAB writes columns
 DELIMITERS = '\t;|,' + BLANKS  # in this order: a comma may be a decimal one
-NOT_MEASURED = (
-    ('', '-', '--', '---', 'na', 'n/a', '#n/a', 'nan', 'null', '<null>', 'none')
-    + ('bad', 'no data', 'nodata', 'bad input', 'i/o timeout', '?')
-)  # fmt: skip
-
-
-_BETWEEN = dict.fromkeys(map(ord, "\u202f\u00a0'\u2019"))  # thousands, beside comma and point
+NOT_MEASURED = {
+    *('', '-', '--', '---', '*', '**', '***', '?', 'na', 'n/a', 'n.a.', 'nan', 'null', '<null>'),
+    *('(null)', '\\n', 'none', 'nil', '<na>', 'missing', 'invalid', 'failed', 'error'),
+    *('#n/a', '#div/0!', '#value!', '#ref!', '#num!', '#name?', '#null!'),  # spreadsheets
+    *('-nan', 'nan(ind)', '-nan(ind)', '1.#qnan', '-1.#qnan', '1.#ind', '-1.#ind'),  # C
+    *('1.#inf', '-1.#inf'),
+    # states of historians
+    *('bad', 'no data', 'nodata', 'bad input', 'bad data', 'bad quality', 'i/o timeout'),
+    *('shutdown', 'comm fail', 'pt created', 'intf shut', 'scan off', 'scan timeout', 'configure'),
+    *('over range', 'under range', 'calc failed', 'not connect', 'invalid data', 'no result'),
+    *('no sample', 'arc off-line', 'tag not found'),
+}
+_CODE = re.compile(r'\[-\d+\].*')  # and errors of theirs: [-11059] No Good Data For Calculation
+_DOUBLE = re.compile(r'(?<=[\d.])d(?=[-+]?\d)', re.IGNORECASE)  # exponent of Fortran
+_SIGNS = dict.fromkeys(map(ord, "\u202f\u00a0'\u2019"))  # thousands, beside comma and point
+_SIGNS[0x2212] = '-'
 
 
 @dataclass(frozen=True)
@@ -57,16 +67,22 @@ def parse_cell(text: str) -> float:
     >>> parse_cell("1'234.5"), parse_cell('39.5 %')
     (1234.5, 39.5)
     """
-    text = text.strip().strip('"').translate(_BETWEEN)
-    if text.lower() in NOT_MEASURED:
+    text = text.strip().strip('"')
+    if text.lower() in NOT_MEASURED or _CODE.fullmatch(text):
         return math.nan
+    text = text.translate(_SIGNS)
+    if '_' in text:  # Python's own way of parting digits: here it is a name
+        raise ValueError(text)
     text = text.removesuffix('%')  # a unit of the column: `sniff`
     if ',' in text:
         if '.' in text:  # the last one is the decimal sign, the other parts thousands
             thousands = '.' if text.rindex(',') > text.rindex('.') else ','
             text = text.replace(thousands, '')
         text = text.replace(',', '.')
-    return float(text)
+    try:
+        return float(text)
+    except ValueError:
+        return float(_DOUBLE.sub('e', text))
 
 
 def is_value(cell: str) -> bool:
@@ -114,6 +130,9 @@ def sniff(path: Path) -> Layout:
     delimiter, width = _delimiter(lines)
     table = [split(line, delimiter) for line in lines]
     first = next((i for i, cells in enumerate(table) if _is_data(cells, width)), len(table))
+    last = [cells[-1].strip() for cells in table[first:] if len(cells) == width]
+    if last and not any(last):
+        width -= 1  # a delimiter ends each line of the data, and perhaps not the header
     before = [i for i in range(min(first, PREAMBLE)) if _wide(table[i], width)]
     names: tuple[str, ...] = ()
     units: tuple[str, ...] = ()

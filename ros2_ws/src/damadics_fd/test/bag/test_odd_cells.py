@@ -1,0 +1,69 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""What stands in the cells of other people's tables where a number should be."""
+
+import numpy as np
+import pytest
+from damadics_fd.bag import BagError
+
+from .table_support import CV, PLAIN, STAMP, VALUES, N, cell, columns_of, iso
+
+pytestmark = pytest.mark.plain
+
+
+@pytest.mark.parametrize(
+    'text',
+    ['#DIV/0!', '#VALUE!', '-nan(ind)', '1.#QNAN', '1.#INF', '(null)', '\\N', 'Shutdown', '*']
+    + ['Comm Fail', 'Tag not found', '[-11059] No Good Data For Calculation', 'n.a.', '<NA>'],
+)
+@pytest.mark.parametrize('suffix', ['csv', 'parquet'])
+def test_what_programs_write_for_no_value_is_not_measured(text, suffix, tmp_path):
+    path = tmp_path / f'a.{suffix}'
+    ps = [text if i % 10 == 5 else cell(VALUES['ps'][i]) for i in range(N)]
+    if suffix == 'parquet':
+        pa = pytest.importorskip('pyarrow')
+        from pyarrow import parquet
+
+        parquet.write_table(pa.table({'stamp': STAMP, **VALUES, 'ps': ps}), path)
+    else:
+        lines = [f'{iso(STAMP[i])},{cell(CV[i])},{cell(CV[i] / 2)},{ps[i]}' for i in range(N)]
+        path.write_text('\n'.join([PLAIN, *lines]))
+    wanted = np.where(np.arange(N) % 10 == 5, np.nan, VALUES['ps'])
+    columns = columns_of(path)
+    assert np.array_equal(columns['ps'], wanted, equal_nan=True)
+    assert columns['x1'].tolist() == VALUES['x1'].tolist()
+
+
+def test_a_minus_of_typesetters_is_a_minus_and_a_digit_is_no_name(tmp_path):
+    lines = [f'{iso(STAMP[i])},{cell(CV[i])},{cell(CV[i])},\u2212{i}' for i in range(N)]
+    (tmp_path / 'a.csv').write_text('\n'.join(['t,cv,x1,t1', *lines]), encoding='utf-8')
+    assert columns_of(tmp_path / 'a.csv')['t1'].tolist() == (-1.0 * np.arange(N)).tolist()
+    (tmp_path / 'a.csv').write_text('\n'.join(['t,cv,x1,t1', *lines]).replace('\u2212', '1_'))
+    with pytest.raises(BagError, match='is no row of numbers'):
+        columns_of(tmp_path / 'a.csv')
+
+
+def test_rows_without_a_time_leave_the_others_exact(tmp_path):
+    pa = pytest.importorskip('pyarrow')
+    from pyarrow import parquet
+
+    time = pa.array([None if i == 7 else int(STAMP[i]) + 1 for i in range(N)], pa.timestamp('ns'))
+    parquet.write_table(pa.table({'time': time, **VALUES}), tmp_path / 'a.parquet')
+    told: list[str] = []
+    columns = columns_of(tmp_path / 'a.parquet', problems=told)
+    assert columns['stamp'].tolist() == np.delete(STAMP + 1, 7).tolist()
+    assert columns['x1'].tolist() == np.delete(VALUES['x1'], 7).tolist()
+    assert told == [
+        f'{tmp_path / "a.parquet"}: 1 rows up to row {N} have no time and are left out'
+    ]
+
+
+def test_a_column_without_numbers_is_named(tmp_path):
+    pa = pytest.importorskip('pyarrow')
+    from pyarrow import parquet
+
+    parquet.write_table(
+        pa.table({'stamp': STAMP, **VALUES, 'x1': [[x] for x in CV]}), tmp_path / 'a.parquet'
+    )
+    with pytest.raises(BagError, match='the column x1 holds no numbers: list'):
+        columns_of(tmp_path / 'a.parquet')
