@@ -289,6 +289,9 @@ def test_axe_finds_nothing_serious_on_any_page(site, hostile, browser, scheme):
         page.goto(site.address + address)
         page.wait_for_timeout(2000)
         assert page_site.serious(page) == [], address
+        page.set_viewport_size({'width': 390, 'height': 844})
+        assert page_site.serious(page) == [], f'{address} on a phone'
+        page.set_viewport_size({'width': 1280, 'height': 720})
     page.close()
 
 
