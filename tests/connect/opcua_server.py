@@ -41,7 +41,12 @@ class OneUser(UserManager):
 
 def take_at_most(most: int) -> None:
     """Refuse a request that has more items than a server takes, as small controllers do."""
-    for service, items in (('create_monitored_items', 'ItemsToCreate'), ('read', 'NodesToRead')):
+    for service, items in (
+        ('create_monitored_items', 'ItemsToCreate'),
+        ('read', 'NodesToRead'),
+        ('write', 'NodesToWrite'),
+        ('browse', 'NodesToBrowse'),
+    ):
 
         async def limited(session, given, inner=getattr(InternalSession, service), items=items):
             if len(getattr(given, items)) > most:
@@ -92,15 +97,17 @@ async def main() -> None:
         if name != 'LOCKED':
             await node.set_writable()
     if options.at_once:
-        take_at_most(options.at_once)
         ids = ua.ObjectIds
         for limit in (
             ids.Server_ServerCapabilities_OperationLimits_MaxMonitoredItemsPerCall,
             ids.Server_ServerCapabilities_OperationLimits_MaxNodesPerRead,
+            ids.Server_ServerCapabilities_OperationLimits_MaxNodesPerWrite,
+            ids.Server_ServerCapabilities_OperationLimits_MaxNodesPerBrowse,
         ):
             await server.get_node(ua.NodeId(limit)).write_value(
                 options.at_once, ua.VariantType.UInt32
             )
+        take_at_most(options.at_once)
     if options.always_report:
         InternalSession.set_monitoring_mode = refuse
     # let it lie about types, as some servers do

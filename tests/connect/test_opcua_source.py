@@ -306,7 +306,7 @@ def test_every_mistake_in_a_configuration_is_told_at_once(domain, tmp_path):
 
 
 def test_browse_proposes_a_configuration_that_runs(connect, serve, domain, tmp_path):
-    server = serve(2)
+    server = serve(2, '--at-once', '2')
     program = executable('damadics_connect', 'opcua')
     done = subprocess.run(
         [program, '--browse', url(server)], capture_output=True, text=True, timeout=60

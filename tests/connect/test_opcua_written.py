@@ -22,8 +22,8 @@ NORMAL, FAILURE, CHECK, OFF_SPEC = 0, 1, 2, 3  # DeviceHealthEnumeration of OPC 
 class Plant:
     """A server of the plant and a connector that writes to it."""
 
-    def __init__(self, processes, folder, **outputs) -> None:
-        self.server = Server(folder, 'opcua_server.py', 1)
+    def __init__(self, processes, folder, *options, **outputs) -> None:
+        self.server = Server(folder, 'opcua_server.py', 1, *options)
         self.url = f'opc.tcp://127.0.0.1:{self.server.port}'
         nodes = {name: f'ns=2;s=FD.{node}' for name, node in outputs.items()}
         beat = nodes.pop('heartbeat', None)
@@ -37,7 +37,7 @@ class Plant:
             async with Client(self.url, timeout=20) as client:
                 nodes = [client.get_node(f'ns=2;s=FD.{name}') for name in NAMES]
                 nodes.append(client.get_node('ns=2;s=LV0.PV'))
-                return await client.read_values(nodes)
+                return [await node.read_value() for node in nodes]
 
         return dict(zip((*NAMES, 'PV'), asyncio.run(values()), strict=True))
 
@@ -48,13 +48,14 @@ class Plant:
         return self.processes.log('opcua').read_text(errors='replace')
 
 
+@pytest.mark.parametrize('options', [(), ('--at-once', '2')], ids=['', 'little at once'])
 def test_judgements_stand_in_the_named_nodes_and_nothing_else_is_touched(
-    processes, domain, tmp_path
+    processes, domain, tmp_path, options
 ):
     with Detectors(domain, 'lv101') as detectors:
         plant = Plant(
-            processes, tmp_path, health='HEALTH', fault='FAULT', ratio='RATIO', cause='CAUSE',
-            heartbeat='BEAT',
+            processes, tmp_path, *options, health='HEALTH', fault='FAULT', ratio='RATIO',
+            cause='CAUSE', heartbeat='BEAT',
         )  # fmt: skip
         try:
             assert plant.shows(HEALTH=NORMAL, FAULT=False, RATIO=0.1, CAUSE=''), plant.log()

@@ -70,6 +70,7 @@ def report(
     bad = [f'{n} {s}: {why}' for n, tally in tallies.items() for s, why in tally.bad.items()]
     uncertain = [f'{n} {s}' for n, tally in tallies.items() for s in tally.uncertain]
     gaps = [(tally.last_gap, name) for name, tally in tallies.items() if tally.gaps]
+    still = [name for name, tally in tallies.items() if tally.still]
     late = {n: joiner.lateness(now) / NANO for n, joiner in joiners.items()} if now else {}
     behind = [n for n, by in late.items() if by > max(LATE, 3 * joiners[n].period)]
     told = {
@@ -81,6 +82,7 @@ def report(
         'Changes come late by [s]': f'{max(late.values(), default=0.0):.1f}',
         'Values sent twice': sum(tally.repeated for tally in tallies.values()),
         'Stamps in the future': sum(tally.future for tally in tallies.values()),
+        'Changes with the time of long before': sum(tally.still for tally in tallies.values()),
         'Clock steps of the source': sum(tally.steps for tally in tallies.values()),
         'Gaps': sum(tally.gaps for tally in tallies.values()),
         'Missing': some(missing),
@@ -101,6 +103,11 @@ def report(
                 'late: their source has fallen behind'
             ]
             if behind
+            else []
+        ),
+        *(
+            [f'values of {some(still)} change while their time stands still: ours is taken']
+            if still
             else []
         ),
         *([f'nothing yet from {some(missing)}'] if missing else []),

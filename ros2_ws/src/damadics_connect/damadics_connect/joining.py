@@ -19,6 +19,7 @@ from damadics_connect.source_clock import DAY, MOST_LATE, NANO, SourceClock
 
 STEP = NANO  # ns; stamps further back than this may be a clock set back, others are only late
 LONGEST_FILL = 3 * NANO  # ns, or three periods: a longer pause is a gap, not a hold
+STILL = 2 * NANO  # ns after which a change with an unchanged time has a time of ours
 WAIT = 2 * NANO  # ns for the first values of all signals
 FIRST_HOLD = 3 * NANO // 10  # ns without a change before the first held sample: a source that
 # has been changing and pauses for less is more likely held up than at rest
@@ -37,6 +38,7 @@ class Tally:
     overtaken: int = 0  # changes that came when a held sample of their time had been sent
     repeated: int = 0  # values sent twice
     future: int = 0  # stamps more than a day ahead
+    still: int = 0  # values that have changed with the time of long before
     steps: int = 0  # of the source's clock
     gaps: int = 0
     last_gap: tuple[int, int] = (0, 0)  # stamps around it [ns]
@@ -67,6 +69,7 @@ class Joiner:
         self._expected = sum(1 << slot for slot in signals)
         self._values = [NAN] * len(SIGNALS)
         self._times = [0] * len(SIGNALS)
+        self._since = [0] * len(SIGNALS)  # when each of them came
         self._back = [0] * len(SIGNALS)
         self._known = 0  # signals that have a value since the session began
         self._group: list[tuple[int, float]] = []
@@ -114,7 +117,7 @@ class Joiner:
 
     def source_clock(self, source_now: int, now: int) -> None:
         """
-        Take the source's clock, as long as no change has told the time.
+        Take the server's clock, which is the source's as long as no change has told the time.
 
         :param source_now: [ns].
         :param now: [ns].
@@ -145,6 +148,7 @@ class Joiner:
         """
         before = self._times[slot]
         bit = 1 << slot
+        told = stamp
         if stamp <= before:
             if stamp == before:
                 held = self._values[slot]
@@ -152,11 +156,18 @@ class Joiner:
                     self.tally.repeated += bool(self._known & bit)
                     self._known |= bit
                     return
+                if now - self._since[slot] > STILL:
+                    told = self._clock.server_at(now)
+                    self.tally.still += value == value  # a bad one may keep the time of a good one
             elif not self._set_back(slot, stamp, before, now):
                 return
+        else:
+            self._since[slot] = now
+        self._times[slot] = stamp
+        stamp = told
         if self._clock.known and stamp - self._clock.at(now) > DAY:
             self.tally.future += 1
-            stamp = self._clock.at(now)
+            stamp = self._times[slot] = self._clock.at(now)
         if self._group and (
             stamp - self._start >= self._period
             or (self._mask & bit and 2 * (stamp - self._start) >= self._period)
@@ -169,7 +180,6 @@ class Joiner:
         self._mask |= bit
         self._news |= bool(self._known & bit)
         self._known |= bit
-        self._times[slot] = stamp
         if stamp > self._end:
             self._end = stamp
         if self._mask == self._expected:

@@ -26,6 +26,7 @@ class SourceClock:
         self.guessed = False  # no change since the session began has told the source's time
         self._late = Lately(LATE)
         self._ahead: int | None = None
+        self._server: int | None = None
         self._at = 0
         self._since = self._changes = 0
         self._lately: int | None = None  # the most in the present window
@@ -41,7 +42,7 @@ class SourceClock:
 
         :param now: time of a clock that nobody sets [ns].
         """
-        self._ahead = None
+        self._ahead = self._server = None
         self._at = now
         self._late = Lately(LATE)
         self._open_window(now)
@@ -53,6 +54,7 @@ class SourceClock:
         :param source_now: [ns].
         :param now: as for `begin` [ns].
         """
+        self._server = source_now - now
         if self._ahead is None:
             self.set(source_now, now)
             self.guessed = True
@@ -66,6 +68,10 @@ class SourceClock:
     def at(self, now: int) -> int:
         """Return the source's time [ns]; our own where nothing has told it."""
         return now + (self._ahead or 0)
+
+    def server_at(self, now: int) -> int:
+        """Return the time of the server that passes the source's values on [ns]."""
+        return self.at(now) if self._server is None else now + self._server
 
     def hear(self, stamp: int, now: int, *, telling: bool) -> int:
         """

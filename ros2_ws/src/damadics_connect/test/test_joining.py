@@ -253,3 +253,29 @@ def test_a_valve_that_is_read_as_often_as_it_changes_is_sampled_from_its_first_c
     for n in range(20):  # CV and X change between any two looks: a sample is always open
         rig.at(0.2 * n, (CV, n), (X1, n), offset=off)
     assert rig.stamps[:17] == [off + n * NANO // 5 for n in range(1, 18)]
+
+
+def test_a_source_whose_time_stands_still_is_followed_by_our_clock():
+    """Some servers give each value the time at which its node was made."""
+    rig = Rig(period=0.2, settle=0.05)
+    rig.joiner.source_clock(DAY0, rig.now)
+    for n in range(100):
+        now = rig.now + NANO // 5 * n
+        for slot in (CV, X1, P1):
+            rig.joiner.take(slot, DAY0 - 3600 * NANO, 0.001 * n, now)
+        rig.joiner.look(now)
+    taken = [row for row in rig.rows if row[1][X1] > 0.0105]
+    assert len(taken) == pytest.approx(88, abs=3)
+    assert np.diff([stamp for stamp, _ in taken[1:]]).tolist() == [NANO // 5] * (len(taken) - 2)
+    assert abs(taken[-1][0] - (DAY0 + 99 * NANO // 5)) < NANO // 10
+    assert rig.joiner.tally.still > 200
+
+
+def test_a_bad_value_with_the_time_of_the_last_good_one_is_taken_at_once():
+    rig = Rig()
+    for t in range(5):
+        rig.at(t, (CV, 0.1 * t), (X1, 0.2 * t), (P1, 1.0))
+    rig.quiet(4.1, 8.0)
+    rig.joiner.take(X1, DAY0 + 4 * NANO, math.nan, rig.now)
+    rig.quiet(8.0, 8.5)
+    assert math.isnan(rig.rows[-1][1][X1]) and rig.joiner.tally.still == 0

@@ -9,11 +9,11 @@ from typing import NamedTuple
 from asyncua import Client, Node, ua
 from damadics_fd.core.text import NAME, plain
 
+from damadics_connect.opcua.limits import limits_of
 from damadics_connect.opcua.values import node_id
 
 MOST = 100_000  # nodes looked at
 DEEPEST = 12  # levels of folders
-AT_ONCE = 200  # nodes of one request
 # The last part of a name and the signal it stands for; control rooms write them in many ways.
 ENDINGS = {
     'cv': r'(?:CV|MV|OP|OUT|SP_?POS|SETPOINT|SET|W)',
@@ -96,13 +96,14 @@ async def variables_of(client: Client) -> list[Variable]:
     found: list[Variable] = []
     seen: set[ua.NodeId] = set()
     level: list[tuple[Node, tuple[str, ...]]] = [(client.nodes.objects, ())]
+    most = (await limits_of(client)).browses
     for _ in range(DEEPEST):
         below: list[tuple[Node, tuple[str, ...]]] = []
-        for begin in range(0, len(level), AT_ONCE):
-            some_of = level[begin : begin + AT_ONCE]
+        for begin in range(0, len(level), most):
+            some_of = level[begin : begin + most]
             results = await client.browse_nodes([node for node, _ in some_of])
             for (_, path), (_, result) in zip(some_of, results, strict=True):
-                for reference in result.References or ():
+                for reference in await _all_references(client, result):
                     nodeid = node_id(reference.NodeId.Identifier, reference.NodeId.NamespaceIndex)
                     if nodeid in seen or not nodeid.NamespaceIndex or len(seen) > MOST:
                         continue
@@ -114,6 +115,18 @@ async def variables_of(client: Client) -> list[Variable]:
         level = below
         if not level:
             break
+    return found
+
+
+async def _all_references(
+    client: Client, result: ua.BrowseResult
+) -> list[ua.ReferenceDescription]:
+    """Return what a node refers to, also where the server hands it over in parts."""
+    found = list(result.References or ())
+    while (point := result.ContinuationPoint) and len(found) < MOST:
+        rest = ua.BrowseNextParameters(ContinuationPoints=[point])
+        (result,) = await client.uaclient.session.browse_next(rest)
+        found += result.References or ()
     return found
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from damadics_fd.ros.arguments import command_parser, split_ros_args, state_folder
 
-from damadics_connect.addresses import address_problem
+from damadics_connect.addresses import address_problem, shown
 from damadics_connect.process import ConnectError, Graph, run
 from damadics_connect.settings import ConfigError, check, read_config
 
@@ -114,6 +114,8 @@ async def browse(url: str, path: Path | None) -> int:
     :param path: a configuration with user and security; None for neither.
     :return: exit code.
     """
+    from asyncua import ua
+
     from damadics_connect.opcua.browse import propose
     from damadics_connect.opcua.session import (
         Endpoint,
@@ -121,6 +123,7 @@ async def browse(url: str, path: Path | None) -> int:
         close_session,
         open_session,
         read_endpoint,
+        why,
     )
 
     if problem := address_problem(url, 'opc.tcp'):
@@ -139,6 +142,8 @@ async def browse(url: str, path: Path | None) -> int:
             await close_session(client)
     except SessionError as problem:
         raise ConnectError(str(problem)) from None
+    except (ua.UaError, OSError, TimeoutError) as problem:
+        raise ConnectError(f'{shown(url)}: {why(problem)}') from None
     return 0
 
 

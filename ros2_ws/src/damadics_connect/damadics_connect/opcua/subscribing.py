@@ -10,21 +10,11 @@ from asyncua import Client, ua
 
 from damadics_connect.opcua.feed import Feed
 from damadics_connect.opcua.node_ids import node_of
-from damadics_connect.opcua.values import node_id
 
-AT_ONCE = 500  # monitored items of one request, so that each is answered in time
 AHEAD = 2  # requests on their way: while the server makes the items of one, we write the next
-MOST_READ = 5000  # values of one request
 BAD = 0x80000000
 Take = Callable[[ua.PublishResult], Awaitable[None]]
 Without = Callable[[int, str], None]  # number of an item, why there is none
-
-
-class Limits(NamedTuple):
-    """How much a server takes in one request."""
-
-    items: int
-    reads: int
 
 
 class Made(NamedTuple):
@@ -32,33 +22,6 @@ class Made(NamedTuple):
 
     subscription: int
     items: list[int]
-
-
-async def limits_of(client: Client) -> Limits:
-    """
-    Ask how much a server takes in one request.
-
-    :param client: with a session.
-    :return: our own limits where the server does not say.
-    """
-    ids = ua.ObjectIds
-    request = ua.ReadParameters(
-        NodesToRead=[
-            ua.ReadValueId(NodeId=node_id(number), AttributeId=ua.AttributeIds.Value)
-            for number in (
-                ids.Server_ServerCapabilities_OperationLimits_MaxMonitoredItemsPerCall,
-                ids.Server_ServerCapabilities_OperationLimits_MaxNodesPerRead,
-            )
-        ]
-    )
-    told = [value.Value.Value if value.Value else 0 for value in await _read(client, request)]
-    items, reads = (value if isinstance(value, int) and value > 0 else 2**31 for value in told)
-    return Limits(min(items, AT_ONCE), min(reads, MOST_READ))
-
-
-async def _read(client: Client, request: ua.ReadParameters) -> list[ua.DataValue]:
-    values: list[ua.DataValue] = await client.uaclient.session.read(request)
-    return values
 
 
 async def subscribe(

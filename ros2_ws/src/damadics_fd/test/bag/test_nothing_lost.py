@@ -253,6 +253,51 @@ def test_messages_whose_schema_is_lost_are_saved_all_the_same(byte, tmp_path):
     assert result.saved.messages == sum(counts.values())
 
 
+@pytest.mark.parametrize('what', [Op.SCHEMA, Op.CHANNEL], ids=['schema', 'channel'])
+@pytest.mark.parametrize('chunks', [True, False], ids=['chunks', 'loose'])
+def test_what_is_said_to_be_saved_is_in_the_file_for_others_too(what, chunks, tmp_path):
+    """A5: whichever byte of a schema or channel is wrong, and with no end of the file to help."""
+    library = pytest.importorskip('mcap.writer')
+    reader = pytest.importorskip('mcap.reader')
+    whole = tmp_path / 'whole.mcap'
+    with whole.open('wb') as stream:
+        writer = library.Writer(stream, use_chunking=False)
+        writer.start('ros2')
+        channels = []
+        for topic in ('/a', '/b'):
+            schema = writer.register_schema(FLOAT, 'ros2msg', b'float64 data')
+            channels.append(writer.register_channel(topic, 'cdr', schema))
+        for n in range(200):
+            writer.add_message(channels[n % 2], n, b'\0\1\0\0' + struct.pack('<d', n), n)
+        writer.finish()
+    data = whole.read_bytes()
+    records = list(spans(data))
+    end = next(begin for op, begin, _ in records if op == Op.DATA_END)
+    head = [data[b:e] for op, b, e in records if op in (Op.SCHEMA, Op.CHANNEL) and b < end]
+    body = b''.join(data[b:e] for op, b, e in records if op == Op.MESSAGE)
+    if chunks:
+        body = record(
+            Op.CHUNK,
+            struct.pack('<QQQII', 0, 199, len(body), 0, 0) + struct.pack('<Q', len(body)) + body,
+        )
+    first = b''.join(head)
+    start = data[: records[0][2]]
+    place = next(b for op, b, _ in spans(start + first + body) if op == what)
+    size = next(e - b for op, b, e in spans(start + first + body) if op == what)
+    known = 0
+    for byte in range(place, place + size):
+        bad = bytearray(start + first + body)
+        bad[byte] ^= 0xFF
+        (tmp_path / 'bad.mcap').write_bytes(bad)
+        intact = sum(topic.count for topic in inspect(tmp_path / 'bad.mcap').topics.values())
+        result = salvage(tmp_path / 'bad.mcap', tmp_path / f'{byte}.mcap')
+        with (tmp_path / f'{byte}.mcap').open('rb') as stream:
+            theirs = sum(1 for _ in reader.make_reader(stream).iter_messages())
+        assert theirs == result.saved.messages >= intact, byte
+        known += theirs == 200
+    assert known > size // 2
+
+
 @pytest.mark.parametrize('times', [0, 2])
 def test_a_chunk_that_is_missing_or_doubled_is_told_by_replay(times, tmp_path, capsys):
     """The records are well formed: only the counts at the end of the file tell."""

@@ -3,6 +3,7 @@
 """What becomes of the alarm of before when a detector starts."""
 
 import json
+import os
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -11,7 +12,7 @@ from damadics_fd.core.decision.alarm import STATE_LATCHED, STATE_UNKNOWN
 from damadics_fd.core.decision.detector import Detector
 from damadics_fd.core.settings import Settings
 from damadics_fd.nodes.alarm_memory import AlarmMemory
-from damadics_fd.store.slots import read_slots, write_slot
+from damadics_fd.store.slots import read_slots, slot_file, write_slot
 
 SETTINGS = Settings.for_mode('monitor')
 SECOND = 10**9
@@ -109,3 +110,78 @@ def test_one_damaged_copy_is_told_and_mended(path):
     assert core.decision.state == STATE_LATCHED
     assert any('one of two copies' in line for line in log.lines)
     assert all(not slot.problem for slot in read_slots(path, FORMAT))
+
+
+def link(target):
+    """Return what puts a link in the place of a file."""
+
+    def put(file):
+        file.unlink()
+        file.symlink_to(target or file)
+
+    return put
+
+
+def folder(file):
+    file.unlink()
+    file.mkdir()
+
+
+def changed(**state):
+    """Return what changes a state but not the hash, as a person with an editor does."""
+
+    def change(file):
+        document = json.loads(file.read_text())
+        document['content'].update(state)
+        file.write_text(json.dumps(document))
+
+    return change
+
+
+DAMAGE = {  # A2: each of them turned the valve green once
+    'cut in half': lambda file: os.truncate(file, file.stat().st_size // 2),
+    'last byte': lambda file: os.truncate(file, file.stat().st_size - 1),
+    'empty': lambda file: os.truncate(file, 0),
+    'zeroed': lambda file: file.write_bytes(bytes(file.stat().st_size)),
+    'nested': lambda file: file.write_text('[' * 100_000),
+    'a number of 5000 digits': lambda file: file.write_text('{"number": ' + '9' * 5000 + '}'),
+    'a list': lambda file: file.write_text('[1, 2]'),
+    'another text': lambda file: file.write_bytes(b'\xff\xfe' + bytes(range(256))),
+    'a folder': folder,
+    'a loop': link(None),
+    'nothing': link('/dev/null'),
+    'nowhere': link('/nowhere/at/all'),
+    'not latched': changed(latched=False, flag=False),
+    'never raised': changed(occurrence=0),
+    'acknowledged': changed(acknowledged=True),
+    'one field more': changed(more=1.0),
+    'no number': changed(worst=float('inf')),
+}
+
+
+@pytest.mark.parametrize('second', [None, 'empty'], ids=['both the same', 'the other is empty'])
+@pytest.mark.parametrize('damage', DAMAGE)
+def test_no_damage_of_both_copies_turns_an_alarm_green(path, damage, second):
+    kept, core, _ = memory(path, **ALARM)
+    files = [slot_file(path, name) for name in ('a', 'b')]
+    for file, how in zip(files, (damage, second or damage), strict=True):
+        DAMAGE[how](file)
+    kept, core, log = memory(path)
+    assert kept.restore() and core.decision.state == STATE_UNKNOWN
+    assert any('lost' in line for line in log.lines)
+    kept, core, _ = memory(path)
+    assert kept.restore() and core.decision.state == STATE_UNKNOWN, 'a restart confirms nothing'
+    aside = [each.name for each in path.parent.iterdir() if '.bad-' in each.name]
+    assert len(aside) >= 2, 'a person can look at what there was'
+
+
+@pytest.mark.parametrize('name', ['a', 'b'])
+@pytest.mark.parametrize('damage', DAMAGE)
+def test_damage_of_one_copy_loses_nothing(path, damage, name):
+    memory(path, **ALARM)
+    DAMAGE[damage](slot_file(path, name))
+    kept, core, log = memory(path)
+    assert kept.restore()
+    assert (core.decision.state, core.decision.occurrence) == (STATE_LATCHED, 7)
+    assert any('one of two copies' in line for line in log.lines)
+    assert all(not slot.problem for slot in read_slots(path, FORMAT)), 'and it is mended'

@@ -15,6 +15,7 @@ from rclpy.node import Node as RosNode
 
 from damadics_connect.health import some
 from damadics_connect.judgement import Judgement
+from damadics_connect.opcua.limits import Limits, limits_of
 from damadics_connect.opcua.node_ids import node_of
 from damadics_connect.opcua.session import Connection, Endpoint
 from damadics_connect.opcua.written.nodes import PlantNode, Value, fitted, wanted_type
@@ -23,7 +24,6 @@ from damadics_connect.watch import Watch
 LOOK = 0.1  # s between two looks at what has changed
 NUMBERS = 1.0  # s between two updates of running numbers, and beats
 LAST_WORD = 1.0  # s for the last values when this process ends
-AT_ONCE = 500  # values of one request
 CURRENT_WRITE = 0x02  # of an access level
 BAD = 0x80000000
 
@@ -65,6 +65,7 @@ class PlantWriter:
         self._written: dict[PlantNode, Value] = {}
         self._refused: dict[PlantNode, str] = {}
         self._told: dict[PlantNode, str] = {}
+        self._most = Limits().writes
         self._count = 0
 
     async def run(self) -> None:
@@ -73,6 +74,7 @@ class PlantWriter:
 
     async def _use(self, client: Client) -> None:
         """Write in one session, until it ends."""
+        self._most = (await limits_of(client)).writes
         places = await self._find(client)
         self._connection.works()
         await self._write_on(client, places)
@@ -179,8 +181,8 @@ class PlantWriter:
                 continue
             if (variant := fitted(value, place.kind)) is not None:
                 new.append((place, value, variant))
-        for begin in range(0, len(new), AT_ONCE):
-            part = new[begin : begin + AT_ONCE]
+        for begin in range(0, len(new), self._most):
+            part = new[begin : begin + self._most]
             results = await client.uaclient.session.write(
                 ua.WriteParameters(
                     NodesToWrite=[
