@@ -207,6 +207,19 @@ def test_a_second_loss_soon_after_the_first_is_mended_too(monkeypatch):
     with_broker(scenario)
 
 
+def test_a_node_that_numbers_nothing_has_lost_nothing():
+    async def scenario(broker, samples, incoming):
+        await broker.birth()
+        before = broker.births_asked
+        for n in range(5):
+            await broker.send('DDATA', write_payload({'POS': 0.01 * n}, now(), None))
+        _, _, values = incoming.report()
+        assert values['Messages lost by edge nodes'] == 0
+        assert broker.births_asked == before
+
+    with_broker(scenario)
+
+
 def test_a_node_that_is_born_again_has_no_device_until_that_is_born():
     async def scenario(broker, samples, incoming):
         await broker.birth()

@@ -117,7 +117,8 @@ class Devices:
         elif kind == 'NBIRTH':
             edge.birth, edge.sequence = birth_of(payload), None
             self._die(group, node)  # each of its devices is born anew
-        self._count(edge, payload.seq, born=kind == 'NBIRTH')
+        if payload.HasField('seq'):
+            self._count(edge, payload.seq, born=kind == 'NBIRTH')
         if kind.startswith('D') and kind != 'DDEATH':
             for valve in valves:
                 edge.wanted |= self._take(valve, payload, born=kind == 'DBIRTH')
