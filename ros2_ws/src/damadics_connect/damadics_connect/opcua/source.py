@@ -14,9 +14,9 @@ from damadics_fd.ros.diagnostics import Report
 from damadics_connect.health import report, some
 from damadics_connect.opcua.feed import Feed, Item, Options
 from damadics_connect.opcua.limits import Limits, limits_of
-from damadics_connect.opcua.node_ids import nanoseconds_of, node_of
 from damadics_connect.opcua.session import Connection, Endpoint, SessionError
 from damadics_connect.opcua.subscribing import Made, report_from_now, subscribe
+from damadics_connect.opcua.values import nanoseconds_of, node_of
 from damadics_connect.opcua.wire import Changes, WireError, read_changes
 from damadics_connect.publishing import Output
 from damadics_connect.valve_list import ValveSource

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from asyncua import Client, ua
 
 from damadics_connect.opcua.feed import Feed
-from damadics_connect.opcua.node_ids import node_of
+from damadics_connect.opcua.values import node_of
 
 AHEAD = 2  # requests on their way: while the server makes the items of one, we write the next
 BAD = 0x80000000

@@ -16,9 +16,8 @@ from asyncua.common.utils import Buffer
 from asyncua.ua.ua_binary import variant_from_binary
 from numpy.typing import NDArray
 
-from damadics_connect.opcua.values import node_id
+from damadics_connect.opcua.values import UNIX, node_id
 
-UNIX = 116_444_736_000_000_000  # 1970 in intervals of 100 ns since 1601
 VALUE, STATUS, SOURCE, SERVER, SOURCE_PICO, SERVER_PICO = (1 << n for n in range(6))
 NUMBERS = {
     1: '?',

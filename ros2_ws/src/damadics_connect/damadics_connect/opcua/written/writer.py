@@ -16,8 +16,8 @@ from rclpy.node import Node as RosNode
 from damadics_connect.health import some
 from damadics_connect.judgement import Judgement
 from damadics_connect.opcua.limits import Limits, limits_of
-from damadics_connect.opcua.node_ids import node_of
 from damadics_connect.opcua.session import Connection, Endpoint
+from damadics_connect.opcua.values import node_of
 from damadics_connect.opcua.written.nodes import PlantNode, Value, fitted, wanted_type
 from damadics_connect.watch import Watch
 
