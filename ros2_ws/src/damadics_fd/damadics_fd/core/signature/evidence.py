@@ -4,7 +4,7 @@
 Evidence for each hypothesis from exponentially weighted sums over moving blocks.
 
 Every hypothesis adds one or two columns to the reference model, whose error is eliminated first
-(`elimination`); then each hypothesis is a division.
+(`sums`); then each hypothesis is a division.
 """
 
 import math
@@ -12,7 +12,6 @@ import math
 import numpy as np
 
 from damadics_fd.core.jit import jit
-from damadics_fd.core.signature.elimination import eliminate_reference, solve_group
 from damadics_fd.core.signature.settings import SignatureSettings
 from damadics_fd.core.signature.state import (
     FRICTION,
@@ -31,7 +30,13 @@ from damadics_fd.core.signature.state import (
     State,
     V,
 )
-from damadics_fd.core.signature.sums import clear_sums, growth_time, precision
+from damadics_fd.core.signature.sums import (
+    clear_sums,
+    eliminate_reference,
+    growth_time,
+    precision,
+    solve_group,
+)
 
 # column of hypotheses 3 to 7: 1, position gain, chamber pressure, P1 - P2, position offset
 COLUMN = np.array([-1, -1, -1, ONE, N_REF + 3, N_REF, N_REF + 1, N_REF + 2])

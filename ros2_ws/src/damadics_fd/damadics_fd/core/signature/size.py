@@ -8,7 +8,6 @@ import numpy as np
 
 from damadics_fd.core.jit import jit
 from damadics_fd.core.record import Floats
-from damadics_fd.core.signature.elimination import eliminate_reference, solve_group
 from damadics_fd.core.signature.evidence import share_friction, share_spring
 from damadics_fd.core.signature.settings import SignatureSettings
 from damadics_fd.core.signature.sliding import STICKY_DOUBT
@@ -29,7 +28,7 @@ from damadics_fd.core.signature.state import (
     State,
     V,
 )
-from damadics_fd.core.signature.sums import precision
+from damadics_fd.core.signature.sums import eliminate_reference, precision, solve_group
 
 UNKNOWN = 0.2  # relative deviation of the unit from which no size is stated
 LARGE = 1.0  # friction change that is stated only if it is known as well itself
