@@ -67,3 +67,26 @@ def test_a_column_without_numbers_is_named(tmp_path):
     )
     with pytest.raises(BagError, match='the column x1 holds no numbers: list'):
         columns_of(tmp_path / 'a.parquet')
+
+
+@pytest.mark.parametrize('header', ['x1 [mm]', 'x1 (in)', 'x1 [kPa]', 'p1 [atm]', 'ps [mmHg]'])
+def test_a_unit_that_is_not_known_is_no_si_unit(header, tmp_path):
+    names = {'x1': 'x1', 'p1': 'p1', 'ps': 'ps'} | {header.split()[0]: header}
+    lines = [f'{iso(STAMP[i])},{cell(CV[i])},{cell(CV[i] / 2)},1,2' for i in range(N)]
+    path = tmp_path / 'a.csv'
+    path.write_text('\n'.join([f't,cv,{names["x1"]},{names["p1"]},{names["ps"]}', *lines]))
+    signal, place = header.split()[0], 3 + list(names).index(header.split()[0])
+    with pytest.raises(BagError, match=r'is not known; write --map .*#PLACE\*FACTOR') as refused:
+        columns_of(path)
+    assert header in str(refused.value)
+    mapped = columns_of(path, f'{signal}=#{place}*0.02')
+    plain = {'x1': CV / 2, 'p1': np.full(N, 1.0), 'ps': np.full(N, 2.0)}[signal]
+    assert np.allclose(mapped[signal], 0.02 * plain)
+
+
+@pytest.mark.parametrize('unit', ['-', '1', '0..1', '%'])
+def test_a_share_has_its_unit_or_none(unit, tmp_path):
+    factor = 100 if unit == '%' else 1
+    lines = [f'{iso(STAMP[i])},{cell(CV[i])},{cell(factor * CV[i] / 2)}' for i in range(N)]
+    (tmp_path / 'a.csv').write_text('\n'.join([f't,cv,x1 [{unit}]', *lines]))
+    assert np.allclose(columns_of(tmp_path / 'a.csv')['x1'], CV / 2, atol=1e-9)

@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from damadics_fd.bag.errors import BagError
 from damadics_fd.bag.mapping import SIGNALS, Scale, unit_scale, units_of
 
 LUBLIN = tuple(
@@ -20,6 +21,7 @@ _TIME_UNIT = re.compile(r'(t|time|timestamp|zeit)_(s|ms|us|ns)', re.IGNORECASE)
 _SLASH = re.compile(r'(.+?)\s*/\s*([^\s/]+)')  # t/s, p / bar
 _AGAIN = re.compile(r'(.+?)(?:\.\d+|_duplicated_\d+)')  # as pandas and polars tell two of one name
 _KNOWN = {unit.lower() for signal in (*SIGNALS, 't') for unit in units_of(signal)} - {'1'}
+_NO_UNIT = {'', '-', '--', '1', '0-1', '0..1', 'si', 'norm', 'fraction', 'p.u.', 'pu'}
 
 
 @dataclass(frozen=True)
@@ -31,9 +33,24 @@ class Header:
     unit: str = ''
 
     def scale(self, signal: str) -> Scale:
-        """Return the scale of its unit, none where the signal does not come in it."""
-        known = {unit.lower() for unit in units_of(signal)}
-        return unit_scale(signal, self.unit) if self.unit.lower() in known else Scale()
+        """
+        Return the scale of its unit.
+
+        :raises BagError: where the signal does not come in this unit: its numbers mean nothing.
+
+        >>> Header('x1 [%]', 'x1', '%').scale('x1')
+        Scale(factor=0.01, offset=0.0)
+        """
+        unit = self.unit.lower()
+        if unit in {name.lower() for name in units_of(signal)}:
+            return unit_scale(signal, self.unit)
+        if unit in _NO_UNIT:
+            return Scale()
+        raise BagError(
+            f'column {self.text!r}: {signal} in {self.unit!r} is not known; write'
+            f" --map '{signal}=#PLACE*FACTOR+OFFSET' (the first column is #1),"
+            f' or one of {", ".join(units_of(signal))}'
+        )
 
 
 def headers(cells: Sequence[str], units: Sequence[str] = ()) -> list[Header]:
