@@ -3,7 +3,7 @@
 """Table of the paper's experiments: what counts as a detection, what as an alarm before it."""
 
 import numpy as np
-from damadics_evaluate.benchmark.paper import Row, _limited, _rising
+from damadics_evaluate.benchmark.paper import Row, _limited, _rising, _scada
 
 
 def test_rising_edges():
@@ -29,3 +29,10 @@ def test_limits_keep_the_fault_free_runs_quiet():
     assert found['paper_nominal'].size == 0
     assert found['paper_friction'].tolist() == [1.0]
     assert found['paper_spring'].tolist() == [1.0]  # 1.3 against 1.1 x 1.1
+
+
+def test_the_control_room_mode_finds_friction_and_spring_in_fast_strokes():
+    alarms = _scada()
+    assert alarms['paper_nominal'].size == 0
+    assert 70.0 <= alarms['paper_friction'].min() <= 90.0
+    assert 70.0 <= alarms['paper_spring'].min() <= 75.0
