@@ -23,7 +23,7 @@ from damadics_fd.core.valve.pneumatics import (
     transducer,
 )
 
-SUB_STEPS = 7  # Euler steps per controller tick, at least; with four a fast stem looks like another
+SUB_STEPS = 7  # Euler steps per controller tick, at least; four mistake a fast stem
 MOST_SUB_STEPS = 40
 STEADY = 0.75  # of the stem's time constant, the longest step
 PRESSURE = 4.0e5  # Pa absolute, about the middle of what a chamber has
