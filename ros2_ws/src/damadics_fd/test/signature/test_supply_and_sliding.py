@@ -60,6 +60,30 @@ def test_a_rate_taken_at_another_pressure_is_judged_by_each_law(law, change, lea
 
 
 @pytest.mark.plain
+def test_strokes_compare_with_all_that_were_learned_not_with_the_one_of_highest_pressure():
+    state, settings = State.rows(), SignatureSettings().record()
+    s, c = state[0], settings[0]
+    far = air.swing(c)  # by which the highest of the learned strokes stands out
+
+    def stroke(way: int, supply: float, ps: float, of: float = 1.0) -> None:
+        flow, drive = (iso(supply, ps), SUPPLY - ps) if way == FILL else (iso(ps, 0.0), ps)
+        s.air_way, s.air_moved, s.air_ps = way, 0.5, ps
+        s.air_second = of * flow / np.sqrt(drive)
+        air.end_stroke(s, c, True)
+
+    for way in (FILL, VENT):
+        for ps, of in ((1.3, 1.0), (1.9, 1.002), (1.3, 1.003), (1.35, 0.999), (1.4, 1.0)):
+            stroke(way, SUPPLY, 1e5 + (ps - 1.3) * far, of)
+        assert s.air_ref_ps[way] == pytest.approx(1e5 + 0.15 * far)
+    for way in (FILL, VENT):
+        for k in range(STROKES):
+            stroke(way, 4e5, 1e5 + 0.02 * k * far)
+    assert s.air_count.tolist() == [STROKES, STROKES]
+    assert air.supply_change(s, c) == pytest.approx(-2e5, abs=4e4)
+    assert air.supply_lost(s, c)
+
+
+@pytest.mark.plain
 @pytest.mark.parametrize('up', [7e5, 3e5])
 @pytest.mark.parametrize('down', [1e5, 2e5, 2.5e5])
 def test_the_flow_law_is_inverted(up, down):

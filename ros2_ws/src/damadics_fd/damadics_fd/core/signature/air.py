@@ -10,6 +10,8 @@ as before; a leak of the chamber fills it slower and vents it faster.
 
 import math
 
+import numpy as np
+
 from damadics_fd.core.jit import jit
 from damadics_fd.core.record import Floats
 from damadics_fd.core.signature.settings import SignatureSettings
@@ -87,9 +89,7 @@ def end_stroke(s: Air, c: SignatureSettings, learn: bool) -> bool:
             s.air_ring[way, s.air_learned[way]] = s.air_second
             s.air_ring_ps[way, s.air_learned[way]] = s.air_ps
             s.air_learned[way] += 1
-            usual = second_best(s.air_ring[way], s.air_learned[way])
-            s.air_ref[way] = s.air_ring[way, usual]
-            s.air_ref_ps[way] = s.air_ring_ps[way, usual]
+            refer(s, c, way)
         return False
     if s.air_ref_ps[way] > 0.0 and abs(s.air_ps - s.air_ref_ps[way]) > ELSEWHERE * swing(c):
         return False  # another process pressure, another driving pressure: it does not compare
@@ -103,6 +103,26 @@ def end_stroke(s: Air, c: SignatureSettings, learn: bool) -> bool:
     s.air_rate[way] = s.air_ring[way, usual] / s.air_ref[way]
     s.air_rate_ps[way] = s.air_ring_ps[way, usual]
     return True
+
+
+@jit
+def refer(s: Air, c: SignatureSettings, way: int) -> None:
+    """
+    Make the reference of the strokes learned so far, at the middle of their pressures.
+
+    At the pressure of one of them, which may be the highest, too few later strokes would compare.
+
+    :param s: state record.
+    :param c: settings record.
+    :param way: FILL or VENT.
+    """
+    n = s.air_learned[way]
+    middle = s.air_ring_ps[way, :n].mean()
+    rates = np.empty(n)
+    for i in range(n):
+        rates[i] = s.air_ring[way, i] * elsewhere(c, way, s.air_ring_ps[way, i], middle)
+    s.air_ref[way] = rates[second_best(rates, n)]
+    s.air_ref_ps[way] = middle
 
 
 @jit
