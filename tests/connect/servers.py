@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Servers of the tests: each in its own process, on a port of its own."""
 
+import contextlib
 import os
 import shutil
 import signal
@@ -43,12 +44,28 @@ def namespaces() -> bool:
     """Tell whether a network of one's own may be made."""
     if not (shutil.which('unshare') and shutil.which('ip')):
         return False
-    return subprocess.run(['unshare', '-rn', 'true'], capture_output=True).returncode == 0
+    return subprocess.run([*NAMESPACE, 'true'], capture_output=True).returncode == 0
 
 
+# with a shared memory of its own: ports of the network are free there that others have in memory
+NAMESPACE = ('unshare', '-rnm', 'bash', '-c', 'mount -t tmpfs none /dev/shm && eval "$0"')
 needs_namespace = pytest.mark.skipif(
     not namespaces(), reason='network namespaces are not allowed here'
 )
+
+
+def in_namespace(script: str, folder: Path, patience: float = 200.0) -> None:
+    """Run a script of bash in a network of its own; whatever it has started ends with it."""
+    environment = {**os.environ, 'RCUTILS_LOGGING_BUFFERED_STREAM': '0'}
+    process = subprocess.Popen(
+        [*NAMESPACE, script], cwd=folder, env=environment, start_new_session=True
+    )
+    try:
+        assert process.wait(patience) == 0
+    finally:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
 
 
 class Server:

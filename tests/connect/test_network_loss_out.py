@@ -3,13 +3,11 @@
 """The network goes and comes back between whoever is told and us: events and notifications."""
 
 import json
-import os
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
-from connect.servers import needs_namespace
+from connect.servers import in_namespace, needs_namespace
 from damadics_bringup.processes import executable
 
 pytestmark = [pytest.mark.ros, needs_namespace]
@@ -59,13 +57,7 @@ def run(folder: Path, script: str, connector: str) -> None:
     text = (BEGIN + script).format(
         python=sys.executable, here=HERE, connector=executable('damadics_connect', connector)
     )
-    subprocess.run(
-        ['unshare', '-rn', 'bash', '-c', text],
-        cwd=folder,
-        timeout=200,
-        env={**os.environ, 'RCUTILS_LOGGING_BUFFERED_STREAM': '0'},
-        check=True,
-    )
+    in_namespace(text, folder)
     log = (folder / f'{connector}.log').read_text()
     assert (folder / 'code').read_text().strip() == '0' and 'Traceback' not in log, log
 

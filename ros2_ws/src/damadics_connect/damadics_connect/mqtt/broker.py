@@ -3,6 +3,7 @@
 """Where the broker is and how it is entered."""
 
 import asyncio
+import errno
 import ssl
 import time
 from pathlib import Path
@@ -52,7 +53,9 @@ class Broker(NamedTuple):
 
         :param will: sent by the broker when we are lost.
         :return: not yet connected.
+        :raises RuntimeError: outside an event loop.
         """
+        asyncio.get_running_loop().set_exception_handler(_without_closed_sockets)
         context = None
         if self.encrypted:
             context = ssl.create_default_context(
@@ -68,6 +71,18 @@ class Broker(NamedTuple):
             timeout=PATIENCE,
             tls_context=context,
         )
+
+
+def _without_closed_sockets(loop: asyncio.AbstractEventLoop, problem: dict[str, object]) -> None:
+    """
+    Pass over a socket that the client has closed before the loop came to watch it.
+
+    :param loop: of the client, whose thread asks the loop to watch its socket.
+    :param problem: what the loop says; that the connection is lost is told by itself.
+    """
+    cause = problem.get('exception')
+    if not (isinstance(cause, OSError) and cause.errno == errno.EBADF):
+        loop.default_exception_handler(problem)
 
 
 class Pulse:
