@@ -90,3 +90,24 @@ def test_a_share_has_its_unit_or_none(unit, tmp_path):
     lines = [f'{iso(STAMP[i])},{cell(CV[i])},{cell(factor * CV[i] / 2)}' for i in range(N)]
     (tmp_path / 'a.csv').write_text('\n'.join([f't,cv,x1 [{unit}]', *lines]))
     assert np.allclose(columns_of(tmp_path / 'a.csv')['x1'], CV / 2, atol=1e-9)
+
+
+@pytest.mark.parametrize('head', ['stamp,time', 't,timestamp', 'date,t,time', 'date,timestamp'])
+def test_two_times_are_refused_until_one_is_named(head, tmp_path):
+    values = {
+        'stamp': lambda i: str(STAMP[i]),
+        't': lambda i: str(i),
+        'date': lambda i: iso(0)[:10],
+    }
+    names = head.split(',')
+    if head == 'date,t,time':
+        values['time'] = lambda i: iso(STAMP[i]).partition('T')[2]
+    lines = [
+        ','.join([*(values.get(n, lambda i: iso(STAMP[i]))(i) for n in names), cell(CV[i]), '0.5'])
+        for i in range(N)
+    ]
+    (tmp_path / 'a.csv').write_text('\n'.join([f'{head},cv,x1', *lines]))
+    with pytest.raises(BagError, match='t may be any of'):
+        columns_of(tmp_path / 'a.csv')
+    place = len(names) if head != 'date,t,time' else 2
+    assert len(columns_of(tmp_path / 'a.csv', f't=#{place}')['stamp']) == N

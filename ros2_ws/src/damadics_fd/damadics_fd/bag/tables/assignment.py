@@ -156,14 +156,19 @@ def _time_of(names: Sequence[Header], free: Sequence[int]) -> tuple[tuple[int, .
                 return found[0]
         return None
 
-    date = first(DATE_NAMES)
-    if date is not None:
-        daytime = first(DAYTIME_NAMES)
-        return ((date, daytime) if daytime is not None else (date,)), None
+    date, daytime = first(DATE_NAMES), first(DAYTIME_NAMES)
     stamp = first(['stamp'])
+    place = first(TIME_NAMES)
+    used = [i for i in (stamp, place) if i is not None][:1]
+    if date is not None:
+        used = [date] if daytime is None else [date, daytime]
+    whole = [i for i in free if names[i].name.lower() in ('stamp', *TIME_NAMES)]
+    if rivals := [i for i in whole if i not in used]:
+        raise doubtful('t', [*used, *rivals], names)
+    if date is not None:
+        return tuple(used), None
     if stamp is not None:
         return (stamp,), NANOSECONDS
-    place = first(TIME_NAMES)
     return ((), None) if place is None else ((place,), _time_scale(names[place]))
 
 
