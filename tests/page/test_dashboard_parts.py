@@ -274,7 +274,8 @@ def test_an_alarm_of_a_control_rooms_signals_names_its_causes():
     alarm = FaultFlag(state=FaultFlag.STATE_ALARM, level=1, occurrence=1, threshold=1.0)
     valve.take_flag(alarm, 100.0)
     told = {'cause': 'f19 or f2', 'confidence': 0.71, 'ratio': 1.2, 'threshold': 1.0}
-    text = 'flow path: f19 flow sensor or f2 plug or seat sedimentation; flow 25 % too low'
+    text = 'flow path or flow sensor: f19 flow sensor or f2 plug or seat sedimentation; '
+    text += 'flow 25 % too low'
     valve.take_event({**event(FaultEvent.CHANGED), **told, 'text': text})
     words = alarm_words(valve, valve.alarm(), texts('en'), name=False)
     assert words.headline == 'Looks like f19 flow sensor or f2 plug or seat sedimentation.'
@@ -285,7 +286,8 @@ def test_an_alarm_of_a_control_rooms_signals_names_its_causes():
     assert '1/s' not in cells['Limit']  # a statistic over its limit
     (row,) = history_rows([{**event(FaultEvent.CHANGED), **told, 'text': text}], texts('de'))
     assert row['text'].startswith('Sieht aus nach f19 Durchflussmesser oder f2 Ablagerung')
-    assert text in row['more']
+    assert row['more'].startswith('Durchfluss 25 % zu niedrig. ')
+    assert 'flow' not in alarm_words(valve, valve.alarm(), texts('de'), name=False).text
 
 
 def test_durations_and_times_have_one_form():

@@ -5,6 +5,9 @@
 import ast
 import inspect
 import math
+import re
+import textwrap
+import time
 
 import numpy as np
 import pytest
@@ -21,15 +24,26 @@ from damadics_dashboard.report.content import Sources, valve_report
 from damadics_dashboard.store.history import History
 from damadics_dashboard.words.answers import answer_words, result_words
 from damadics_dashboard.words.commission import commission_words
+from damadics_dashboard.words.findings import headline
 from damadics_dashboard.words.texts import texts, use_causes
-from damadics_dashboard.words.valve_words import headline, history_rows
+from damadics_dashboard.words.valve_words import history_rows, reason_of
+from damadics_fd.commands.commission import checks, verdict
+from damadics_fd.commands.commission import monitor as commission_monitor
+from damadics_fd.core.approximator.estimator import Estimator
 from damadics_fd.core.decision import requests
+from damadics_fd.core.quality import Reason, Refused
+from damadics_fd.core.scada.laws import identify as commission_scada
+from damadics_fd.core.scada.laws import plausible
+from damadics_fd.core.scada.monitor import ScadaMonitor
 from damadics_fd.nodes import partial_strokes
+from damadics_fd.nodes.frozen_position import FrozenPosition
+from damadics_fd.nodes.input_watch import InputWatch
 from damadics_fd.store.intervals import Intervals, Series
 from damadics_fd.store.trends import TrendFile
 from damadics_msgs.msg import FaultEvent, FaultFlag
 
 EN, DE = texts('en'), texts('de')
+ENGLISH = re.compile(r'\b(the|is|are|of|that|not|with|than)\b')
 
 
 def test_the_verdict_of_commission_is_told_in_the_readers_language():
@@ -138,6 +152,108 @@ def test_what_nodes_answer_is_told_in_the_readers_language(module, wanted):
     assert result_words({'result': 'a word of its own', 'done': True}, DE) == 'a word of its own'
 
 
+def told(*functions):
+    """Return the sentences of functions, with numbers where they fill something in."""
+    for function in functions:
+        body = ast.parse(textwrap.dedent(inspect.getsource(function))).body[0]
+        notes = {id(n.value) for n in ast.walk(body) if isinstance(n, ast.Expr)}
+        inner = {
+            id(part)
+            for n in ast.walk(body)
+            if isinstance(n, ast.JoinedStr)
+            for value in n.values
+            for part in ast.walk(value)
+        }
+        for node in ast.walk(body):
+            if isinstance(node, ast.Constant) and id(node) not in notes | inner:
+                text = node.value
+            elif isinstance(node, ast.JoinedStr) and id(node) not in inner:
+                text = ''.join(
+                    v.value if isinstance(v, ast.Constant) else '7' for v in node.values
+                )
+            else:
+                continue
+            if isinstance(text, str) and text.count(' ') >= 2:
+                yield text.removeprefix('7: ')
+
+
+SENTENCES = {
+    'why a valve is not commissioned well': (
+        verdict.parts_differ,
+        verdict.another_valve,
+        checks.dead_signals,
+        commission_monitor._limited,
+        commission_scada._missed,
+        commission_scada._second_half,
+        plausible.possible,
+        plausible.check_stem,
+        plausible.check_flow,
+    ),
+    'what an estimator says of itself': (
+        Estimator.status.fget,
+        ScadaMonitor.strange.fget,
+        FrozenPosition.problem.fget,
+        InputWatch.lateness.fget,
+        InputWatch.problem.fget,
+    ),
+}
+
+
+@pytest.mark.parametrize('functions', SENTENCES.values(), ids=SENTENCES)
+def test_what_nodes_and_commission_say_is_told_in_the_readers_language(functions):
+    found = list(told(*functions))
+    assert len(found) >= 8
+    for text in found:
+        words = answer_words(text, 'de')
+        assert words != text and not ENGLISH.search(words), f'{text!r} becomes {words!r}'
+        assert answer_words(text, 'en') == text
+
+
+def test_why_samples_are_refused_is_told_in_the_readers_language():
+    for reason in list(Reason)[1:]:
+        refused = Refused(reason, 'x1 = 7')
+        for text in (refused.explanation, refused.remedy):
+            assert not ENGLISH.search(answer_words(text, 'de')), text
+
+
+def test_one_sentence_of_several_clauses_is_found_among_others():
+    learning = 'learning, 18 %: insufficient excitation, 1.25 of 2.00 strokes travelled; move the '
+    learning += 'valve both ways'
+    said = f'an alarm stands; no limit can be proposed: {learning}; record longer; a word; '
+    said += 'p1 is the constant 3.5 Pa: it is not measured'
+    assert answer_words(said, 'de') == (
+        'ein Alarm steht an; Es lässt sich keine Grenze vorschlagen: lernt, 18 %: zu wenig '
+        'bewegt: 1,25 von 2,00 Hüben; das Ventil in beide Richtungen bewegen; länger aufzeichnen; '
+        'a word; p1 ist die Konstante 3,5 Pa: es wird nicht gemessen'
+    )
+
+
+@pytest.mark.parametrize('hostile', ['a; ' * 333, 'raised a: ' * 100, 'on hold: x; ' * 80])
+def test_a_sentence_that_somebody_made_up_does_not_hold_up_the_page(hostile):
+    began = time.process_time()
+    answer_words(hostile, 'de')
+    assert time.process_time() - began < 1.0
+
+
+def test_a_valve_that_learns_for_long_says_why():
+    valve = Valve('lv101')
+    valve.take_flag(FaultFlag(state=FaultFlag.STATE_LEARNING), 100.0)
+    valve.diagnostics['estimator'] = {
+        'Learning progress (%)': '18',
+        'Message': 'learning, 18 %: insufficient excitation, 1.25 of 2.00 strokes travelled; '
+        'move the valve both ways',
+    }
+    valve.levels['estimator'], valve.told_at['estimator'] = 1, 100.0
+    condition = valve.condition(100.1, 0)
+    assert reason_of(valve, condition, EN, 100.1) == (
+        '18 % of the fault-free valve is learned: insufficient excitation, 1.25 of 2.00 strokes '
+        'travelled; move the valve both ways'
+    )
+    assert reason_of(valve, condition, DE, 100.1).endswith('in beide Richtungen bewegen')
+    valve.diagnostics['estimator']['Message'] = 'learning, 18 %'
+    assert reason_of(valve, condition, EN, 100.1) == '18 % of the fault-free valve is learned'
+
+
 def test_a_valve_that_is_not_monitored_shows_no_residual_of_before():
     valve = Valve('lv101')
     valve.take_flag(FaultFlag(state=FaultFlag.STATE_HEALTHY, residual=0.4, threshold=0.5), 100.0)
@@ -152,11 +268,11 @@ def test_a_point_of_a_trend_that_stands_alone_is_drawn():
     found = Series(start, 900.0, ones, ones, ones, ones, [])
     drawn = points_of(found, ones)
     parts = [[]]
-    for time, value in drawn:
+    for moment, value in drawn:
         if value is None:
             parts.append([])
         else:
-            parts[-1].append(time)
+            parts[-1].append(moment)
     assert [len(part) > 1 for part in parts] == [True, True], 'a line needs two points'
     assert points_of(found, ones, 9000.0)[-2:] == [[85_950.0, 1.0], [94_950.0, 1.0]]
     assert points_of(Series(start[:0], 900.0, *[ones[:0]] * 4, []), ones[:0]) == []

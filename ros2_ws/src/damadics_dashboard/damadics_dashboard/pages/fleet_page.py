@@ -15,8 +15,9 @@ from damadics_dashboard.live.watcher import Watcher
 from damadics_dashboard.pages.alarms import AlarmList
 from damadics_dashboard.pages.elements import markup, tell
 from damadics_dashboard.pages.frame import card, frame
+from damadics_dashboard.words.findings import headline, of_limit
 from damadics_dashboard.words.texts import Texts
-from damadics_dashboard.words.valve_words import address, area_of, headline, of_limit, reason_of
+from damadics_dashboard.words.valve_words import address, area_of, reason_of
 
 PERIOD = 0.2  # s
 ABOVE = 30  # valves from which on alarms stand above the tiles: nobody scrolls past so many

@@ -17,11 +17,7 @@ from damadics_dashboard.store.history import ACTION_COLUMNS, COLUMNS, Wanted
 from damadics_dashboard.store.rows import ActionRow
 from damadics_dashboard.words.answers import result_words
 from damadics_dashboard.words.texts import Texts
-from damadics_dashboard.words.valve_words import (
-    TRANSITIONS,
-    address,
-    history_rows,
-)
+from damadics_dashboard.words.valve_words import TRANSITIONS, address, history_rows
 
 DAYS = {0: 'all_time', 1: 'last_day', 7: 'last_week', 30: 'last_month', 365: 'last_year'}
 PAGE = 100  # rows

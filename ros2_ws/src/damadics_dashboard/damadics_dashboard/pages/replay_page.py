@@ -19,8 +19,9 @@ from damadics_dashboard.pages.charts import Options, signature_plot, time_plot
 from damadics_dashboard.pages.elements import box, markup, tell, with_values
 from damadics_dashboard.pages.frame import card, frame
 from damadics_dashboard.pages.plots import News, Plot
+from damadics_dashboard.words.findings import cause_of, faults_of
 from damadics_dashboard.words.texts import Texts
-from damadics_dashboard.words.valve_words import cause_of, faults_of, history_rows
+from damadics_dashboard.words.valve_words import history_rows
 
 if TYPE_CHECKING:
     from damadics_dashboard.pages.playback import Given, Playback, Truth

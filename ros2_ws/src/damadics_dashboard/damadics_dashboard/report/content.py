@@ -13,14 +13,10 @@ from damadics_dashboard.report.signature import SignatureLines, signature_lines
 from damadics_dashboard.store.history import History, Wanted
 from damadics_dashboard.store.rows import ActionRow, EventRow
 from damadics_dashboard.words.answers import result_words
+from damadics_dashboard.words.findings import found_by, headline
 from damadics_dashboard.words.outlook import outlook_words, value_words
 from damadics_dashboard.words.texts import Texts
-from damadics_dashboard.words.valve_words import (
-    TRANSITIONS,
-    found_by,
-    headline,
-    history_rows,
-)
+from damadics_dashboard.words.valve_words import TRANSITIONS, history_rows
 
 DAY = 86400.0
 MOST_EVENTS = 5000

@@ -4,7 +4,7 @@
 
 import re
 from collections.abc import Mapping
-from functools import cache
+from functools import cache, lru_cache
 from importlib import resources
 
 import yaml
@@ -13,6 +13,9 @@ from damadics_dashboard.store.rows import ActionRow
 from damadics_dashboard.words.texts import Texts
 
 GAP = '{}'  # in a sentence: what changes
+AND = '; '  # between sentences, and within some
+MOST = 4  # such parts of one sentence
+NUMBER = re.compile(r'[-+]?\d+\.\d+(e[-+]?\d+)?')
 
 
 def answer_words(text: str, language: str) -> str:
@@ -29,11 +32,35 @@ def answer_words(text: str, language: str) -> str:
     'p1 ist die Konstante 3 Pa: es wird nicht gemessen; ein Alarm steht an'
     >>> answer_words('partial strokes ended: an alarm stands', 'de')
     'Teilhübe beendet: ein Alarm steht an'
+    >>> answer_words('no limit can be proposed: x; record longer; an alarm stands', 'de')
+    'Es lässt sich keine Grenze vorschlagen: x; länger aufzeichnen; ein Alarm steht an'
     """
+    return _told(text, language)[0] if _known(language) else text
+
+
+@lru_cache(maxsize=512)
+def _told(text: str, language: str) -> tuple[str, int]:
+    """Translate sentences; return them and how many characters were left as they are."""
+    clauses = text.split(AND)
+    after = [('', 0)]  # of the last clauses, from none of them to all
+    for begin in reversed(range(len(clauses))):
+        found = []
+        for end in range(begin + 1, min(begin + MOST, len(clauses)) + 1):
+            words, left = _sentence(AND.join(clauses[begin:end]), language)
+            rest, rest_left = after[end - begin - 1]
+            found.append((AND.join(part for part in (words, rest) if part), left + rest_left))
+        after.insert(0, min(found, key=lambda candidate: candidate[1]))
+    return after[0]
+
+
+def _sentence(text: str, language: str) -> tuple[str, int]:
+    """Translate one sentence with what changes in it, so that least is left."""
+    found = [(text.replace('.', ','), 1) if NUMBER.fullmatch(text) else (text, len(text))]
     for said, words in _known(language):
-        if found := said.fullmatch(text):
-            return words.format(*(answer_words(part, language) for part in found.groups()))
-    return text
+        if matched := said.fullmatch(text):
+            gaps = [_told(part, language) for part in matched.groups()]
+            found.append((words.format(*(gap for gap, _ in gaps)), sum(n for _, n in gaps)))
+    return min(found, key=lambda candidate: candidate[1])
 
 
 def result_words(row: ActionRow, t: Texts) -> str:

@@ -7,20 +7,27 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from urllib.parse import quote
 
-from damadics_fd.causes import MOST_CERTAIN, Cause
 from damadics_fd.core.decision.events import STATISTIC
-from damadics_fd.core.scada.naming.names import NAMES
 from damadics_fd.core.stamps import SECOND as NANO
-from damadics_fd.core.text import COMMENT, SENTENCE, plain
+from damadics_fd.core.text import SENTENCE, plain
 from damadics_msgs.msg import FaultEvent
 
 from damadics_dashboard.live.judged import NE107
 from damadics_dashboard.live.valve import Alarm, Condition, Valve
 from damadics_dashboard.store.rows import Cell, EventRow
+from damadics_dashboard.words.answers import answer_words
+from damadics_dashboard.words.findings import (
+    faults_of,
+    found_by,
+    headline,
+    numbers_of,
+    of_limit,
+    signs_of,
+)
 from damadics_dashboard.words.texts import Texts
 
-SHARED = ('', 'none')
 RECENT = 3.0  # s; diagnostics come every second
+LEARNING = ' %: '  # before what an estimator says of why it learns for long
 TRANSITIONS = {
     FaultEvent.RAISED: 'raised',
     FaultEvent.CLEARED: 'cleared',
@@ -104,66 +111,13 @@ def reason_of(valve: Valve, condition: Condition, t: Texts, now: float) -> str:
         number = told.get('Publishers', '')
         if number.isdigit() and int(number) > 1 and condition.kind in ('off', 'learn'):
             return t('several_publishers', number=number)
-        if condition.detail == 'input_refused' and valve.levels.get('estimator', 0):
-            return plain(told.get('Message', ''), COMMENT) or detail_of(condition, t)
+        said = plain(told.get('Message', ''), SENTENCE)
+        if said and valve.levels.get('estimator', 0):
+            if condition.detail == 'input_refused':
+                return answer_words(said, t.language)
+            if condition.kind == 'learn' and (why := said.partition(LEARNING)[2]):
+                return f'{detail_of(condition, t)}: {answer_words(why, t.language)}'
     return detail_of(condition, t)
-
-
-def cause_of(name: str, t: Texts) -> Cause | None:
-    """
-    Look up a cause.
-
-    :param name: as an event carries it.
-    :param t: the words.
-    :return: its entry; None where it has none.
-    """
-    return t.causes.causes.get(name) if name not in SHARED else None
-
-
-def faults_of(names: str, t: Texts) -> str:
-    """
-    Word the faults of the benchmark that a control room's signals show.
-
-    :param names: as an event of mode scada carries them.
-    :param t: the words.
-    :return: '' where they are no such names.
-
-    >>> from damadics_dashboard.words.texts import texts
-    >>> faults_of('f19 or f2', texts('en')), faults_of('friction_up', texts('en'))
-    ('f19 flow sensor or f2 plug or seat sedimentation', '')
-    """
-    known = {f'f{number}': t(f'fault_{number}') for number in NAMES}
-    named = names.split(' or ')
-    if not set(named) <= set(known):
-        return ''
-    return t('fault_or').join(f'{name} {known[name]}' for name in named)
-
-
-def headline(event: EventRow, t: Texts) -> tuple[str, str, str]:
-    """
-    Say first what is wrong and how much, and what to do.
-
-    :param event: the evidence of an alarm, as the history keeps it; may be empty.
-    :param t: the words.
-    :return: what is wrong, the numbers of the cause, what to do.
-    """
-    cause = cause_of(event.get('cause') or '', t)
-    if cause is not None:
-        strength = event.get('strength')
-        confidence = event.get('confidence')
-        return cause.words(
-            math.nan if strength is None else strength,
-            event.get('deviation', math.nan),
-            math.nan if confidence is None else confidence,
-        )
-    if named := faults_of(event.get('cause') or '', t):
-        sure = event.get('confidence')
-        numbers = '' if sure is None else t('sure', share=t.percent(min(sure, MOST_CERTAIN)))
-        return t('looks_like', cause=named), numbers, t('deviates_advice')
-    ratio = event.get('ratio')
-    if ratio is not None and math.isfinite(ratio) and ratio >= 1.0:
-        return t('deviates', size=of_limit(ratio, t)), '', t('deviates_advice')
-    return t('deviates_some'), '', t('deviates_advice')
 
 
 def alarm_words(valve: Valve, alarm: Alarm, t: Texts, *, name: bool) -> AlarmWords:
@@ -202,27 +156,9 @@ def alarm_words(valve: Valve, alarm: Alarm, t: Texts, *, name: bool) -> AlarmWor
         t('acknowledged' if alarm.acknowledged else 'unacknowledged'),
         t('since_time', time=t.moment(alarm.onset)) if alarm.onset else '',
         found_by(e, t),
-        plain(e.get('text') or '', SENTENCE),
+        numbers_of(e, t),
         [cell for cell in cells if cell[1] != '–'],
     )
-
-
-def found_by(event: EventRow, t: Texts) -> str:
-    """
-    Say who found a fault.
-
-    :param event: the evidence of an alarm; may be empty.
-    :param t: the words.
-    :return: a sentence, '' where nothing is known.
-    """
-    if event.get('found_by') == 'control-room test' or faults_of(event.get('cause') or '', t):
-        return t('found_test')
-    ratio = event.get('ratio')
-    if ratio is None or not math.isfinite(ratio):
-        return ''
-    if ratio < 1.0:
-        return t('found_signature')
-    return t('found_both' if cause_of(event.get('cause') or '', t) else 'found_threshold')
 
 
 def alarm_kind(alarm: Alarm) -> str:
@@ -256,8 +192,8 @@ def _row(row: EventRow, t: Texts) -> dict[str, Cell]:
     elif transition == FaultEvent.NEAR_MISS and row['ratio'] is not None:
         what = t('near_miss_text', size=of_limit(row['ratio'], t))
     told = plain(row['text'] or '', SENTENCE)
-    if faults_of(row['cause'] or '', t):  # the sentence says how much is off
-        advice = f'{told}. {advice}'
+    if faults_of(row['cause'] or '', t) and (signs := signs_of(told, t)):
+        advice = f'{signs}. {advice}'
     return {
         'moment': t.moment(row['stamp']),
         'valve': row['valve'] or 'valve',
@@ -275,21 +211,6 @@ def _lasting(event: EventRow, t: Texts) -> str:
     """Word how long a fault was there, and how much of it nobody could look."""
     time, unseen = t.duration(event.get('duration')), event.get('unseen')
     return t('part_unseen', time=time, unseen=t.duration(unseen)) if unseen else time
-
-
-def of_limit(ratio: float | None, t: Texts) -> str:
-    """
-    Word how large a residual is.
-
-    :param ratio: residual / threshold.
-    :param t: the words.
-    :return: in percent of the limit, or as its multiple.
-    """
-    if ratio is None or not math.isfinite(ratio):
-        return '–'
-    if ratio < 10.0:
-        return t('of_limit', share=f'{100.0 * ratio:.0f}')
-    return t('times_limit', ratio=t.number(ratio))
 
 
 def seconds_of(stamp: int) -> float:

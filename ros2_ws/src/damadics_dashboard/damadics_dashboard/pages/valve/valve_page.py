@@ -24,13 +24,9 @@ from damadics_dashboard.pages.valve.signals import Signals
 from damadics_dashboard.pages.valve.simulator import simulator_panel
 from damadics_dashboard.pages.valve.trend_card import TrendCard
 from damadics_dashboard.words.commission import commission_words
+from damadics_dashboard.words.findings import headline, of_limit
 from damadics_dashboard.words.texts import DASH, Texts
-from damadics_dashboard.words.valve_words import (
-    headline,
-    history_rows,
-    of_limit,
-    reason_of,
-)
+from damadics_dashboard.words.valve_words import history_rows, reason_of
 
 PERIOD = 0.2  # s
 SIGNATURE_NOW = 30.0  # s
