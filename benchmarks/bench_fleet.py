@@ -13,6 +13,11 @@ With --json instead: what process `fleet`, joined monitors and the compiled loop
 of one run (`many_valves.py` says how).
 
     python benchmarks/bench_fleet.py --json fleet.json
+
+Joined monitors are compared with nodes apart, or with those of another version of the project:
+
+    git worktree add ../version_0.1 c2c9fd2^ && make -C ../version_0.1 build
+    python benchmarks/bench_fleet.py --json fleet.json --before ../version_0.1
 """
 
 import argparse
@@ -238,11 +243,19 @@ def main() -> None:
     parser.add_argument(
         '--json', type=Path, metavar='FILE', help='measure many valves instead, write figures here'
     )
+    parser.add_argument(
+        '--before',
+        type=lambda text: Path(text).absolute(),
+        metavar='FOLDER',
+        help='with --json: compare joined monitors with the version that is built here',
+    )
     options = parser.parse_args()
+    if options.before and not (options.before / 'ros2_ws/install/damadics_fd').is_dir():
+        parser.error(f'{options.before} is not built: make -C {options.before} build')
     with tempfile.TemporaryDirectory() as folder:
         if options.json:
             os.environ.update(surroundings(free_domain()), XDG_STATE_HOME=f'{folder}/state')
-            found = many_valves.figures(Path(folder))
+            found = many_valves.figures(Path(folder), options.before)
             options.json.write_text(json.dumps(found, indent=2) + '\n')
             for name, value in found.items():
                 print(f'{name:28s} {value:12.4g}')

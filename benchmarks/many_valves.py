@@ -239,11 +239,12 @@ def fleet(
     }
 
 
-def figures(folder: Path) -> dict[str, float]:
+def figures(folder: Path, before: Path | None = None) -> dict[str, float]:
     """
     Measure everything.
 
     :param folder: for lists, references and alarms.
+    :param before: folder of the version that joined monitors are compared with, built.
     :return: figures by name.
     """
     rclpy.init()
@@ -252,7 +253,7 @@ def figures(folder: Path) -> dict[str, float]:
     many = fleet(folder, 1000, 'monitor', 2_000_000, column.time)
     few = fleet(folder, 10, 'monitor', 8000, column.time)
     scada = fleet(folder, 200, 'scada', 140_000, column.time)
-    single = single_messages.figures()
+    single = single_messages.figures(before)
     rclpy.shutdown()
     return {
         'blocks_over_column_loop': many['ratio'],

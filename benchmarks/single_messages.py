@@ -1,10 +1,13 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
 """
-What one message per sample costs: joined monitors against a bare relay, and against nodes apart.
+What one message per sample costs: joined monitors against a bare relay, nodes apart, version 0.1.
 
 All processes run at the same time, each in a domain of its own, and are sent samples in turns: a
-machine that is busy with other work is then busy for all of them.
+machine that is busy with other work is then busy for all of them. Called by itself, this measures
+nothing else:
+
+    python benchmarks/single_messages.py figures [FOLDER OF ANOTHER VERSION, BUILT]
 """
 
 import os
@@ -28,6 +31,15 @@ VALVES, RATE = 10, 100.0  # and samples a second of each
 TURNS, TURN = 6, 2.0  # of each process, and how long [s]
 SETTLED = 4.0  # s after the start
 PATIENCE = 180.0  # s
+OWN_PATHS = (  # of this build: another one has its own
+    'AMENT_PREFIX_PATH',
+    'CMAKE_PREFIX_PATH',
+    'COLCON_PREFIX_PATH',
+    'LD_LIBRARY_PATH',
+    'PYTHONPATH',
+    'ROS_DISTRO',
+    'VIRTUAL_ENV',
+)
 NAMES = [f'lv{n:05d}' for n in range(VALVES)]
 
 
@@ -46,11 +58,16 @@ class Tested:
 
     :param words: its command line.
     :param heard: somebody listens to what it says of each sample.
+    :param build: folder of another version of the project, built, that it is of.
     """
 
-    def __init__(self, words: list[str], heard: bool) -> None:
+    def __init__(self, words: list[str], heard: bool, build: Path | None = None) -> None:
         domain = free_domain()
         environment = {**os.environ, **surroundings(domain)}
+        theirs = environment
+        if build:
+            theirs = {name: x for name, x in environment.items() if name not in OWN_PATHS}
+            words = ['bash', '-c', f'source {build}/env.sh && exec "$@"', 'bash', *words]
         quiet = {'stdout': subprocess.DEVNULL, 'stderr': subprocess.DEVNULL}
         self._context = Context()
         rclpy.init(context=self._context, domain_id=domain)
@@ -59,7 +76,7 @@ class Tested:
             self._node.create_publisher(Measurement, f'/{name}/measurement', qos.SAMPLES)
             for name in NAMES
         ]
-        self._processes = [subprocess.Popen(words, env=environment, **quiet)]
+        self._processes = [subprocess.Popen(words, env=theirs, **quiet)]
         if heard:
             ears = [sys.executable, __file__, 'listen']
             self._processes.append(subprocess.Popen(ears, env=environment, **quiet))
@@ -103,19 +120,20 @@ class Tested:
 
 
 @contextmanager
-def tested(words: list[str], heard: bool = False):
+def tested(words: list[str], heard: bool = False, build: Path | None = None):
     """Run a process while it is needed."""
-    one = Tested(words, heard)
+    one = Tested(words, heard, build)
     try:
         yield one
     finally:
         one.close()
 
 
-def figures() -> dict[str, float]:
+def figures(before: Path | None = None) -> dict[str, float]:
     """
     Measure all processes in turns.
 
+    :param before: folder of the version that is compared with, built; nodes apart by default.
     :return: CPU time per sample by process, the middle one of the turns [us], and the ratios, of
         turns that followed each other.
     """
@@ -131,8 +149,13 @@ def figures() -> dict[str, float]:
             'relay': stack.enter_context(tested([*own, 'relay'])),
             'joined': stack.enter_context(tested(joined)),
             'joined_heard': stack.enter_context(tested(joined, heard=True)),
-            'before_heard': stack.enter_context(tested([*own, 'apart', *words], heard=True)),
+            'apart_heard': stack.enter_context(tested([*own, 'apart', *words], heard=True)),
         }
+        if before:
+            monitors = before / 'ros2_ws/install/damadics_fd/lib/damadics_fd/monitors'
+            all_of['before_heard'] = stack.enter_context(
+                tested([str(monitors), *words], heard=True, build=before)
+            )
         deadline = time.monotonic() + PATIENCE
         while not all(one.ready() for one in all_of.values()):
             if time.monotonic() > deadline:
@@ -146,7 +169,10 @@ def figures() -> dict[str, float]:
 
     return {
         'joined_over_relay': middle('joined', 'relay'),
-        'joined_heard_over_before': middle('joined_heard', 'before_heard'),
+        'joined_heard_over_before': middle(
+            'joined_heard', 'before_heard' if before else 'apart_heard'
+        ),
+        'joined_heard_over_apart': middle('joined_heard', 'apart_heard'),
         **{f'{name}_us': statistics.median(turn[name] for turn in turns) for name in turns[0]},
     }
 
@@ -192,7 +218,7 @@ def relay() -> None:
 
 
 def apart(words: list[str]) -> None:
-    """Run monitors in one process whose estimates go over DDS, as before they were joined."""
+    """Run monitors in one process whose estimates go over DDS, as those of two processes."""
     from damadics_fd.nodes import monitors
 
     monitors.Joints = lambda: None  # each node then has joints of its own
@@ -200,8 +226,11 @@ def apart(words: list[str]) -> None:
 
 
 if __name__ == '__main__':
-    what, *words = sys.argv[1:]
+    what, *words = sys.argv[1:] or ['figures']
     if what == 'apart':
         apart(words)
+    elif what == 'figures':
+        for name, value in figures(Path(words[0]).absolute() if words else None).items():
+            print(f'{name:28s} {value:12.4g}')
     else:
         {'listen': listen, 'relay': relay}[what]()

@@ -5,7 +5,7 @@
 import pytest
 from damadics_bringup.processes import parameters
 from damadics_fd.ros import qos
-from damadics_fd.ros.conversions import nanoseconds
+from damadics_fd.ros.conversions import nanoseconds, set_stamp
 from damadics_msgs.msg import Estimate, FaultFlag, Float64Stamped
 from driven_valve import SETTINGS, Valve
 from lifecycle_msgs.msg import Transition
@@ -33,7 +33,8 @@ def test_joined_nodes_are_two_nodes_to_everybody_else(processes, peer):
     # with nobody else listening, it judges and raises alarms
     assert valve.run_until(lambda: valve.flags[-1].state == HEALTHY)
     valve.raise_alarm()
-    assert graph.count_publishers('/estimate') == graph.count_subscribers('/estimate') == 1
+    assert graph.count_publishers('/estimate') == 1
+    assert graph.count_subscribers('/estimate') == 0  # nothing comes back through DDS
 
     # who subscribes gets every sample once, and the detector hears none twice
     heard = {
@@ -53,13 +54,34 @@ def test_joined_nodes_are_two_nodes_to_everybody_else(processes, peer):
     )
     assert values(valve, 'detector')['Estimates received twice'] == '0'
 
-    # another estimator of the same valve is told
+    # another estimator of the same valve is told, and what it sends is judged
     other = graph.create_publisher(Estimate, 'estimate', qos.SAMPLES)
     assert peer.wait(lambda: other.get_subscription_count() == 2)  # the detector and this test
     peer.wait(lambda: False, 0.3)
     other.publish(heard['estimate'][-1])
     assert valve.run_until(lambda: values(valve, 'detector')['Estimates received twice'] == '1')
+    assert valve.run_until(lambda: values(valve, 'detector')['Publishers'] == '2')
+    valve.run(
+        2.0
+    )  # what the estimator beside it publishes comes to the detector too, and is known
+    assert values(valve, 'detector')['Estimates received twice'] == '1'
     graph.destroy_publisher(other)
+    assert valve.run_until(lambda: graph.count_subscribers('/estimate') == 1)  # this test
+
+    # an estimator outside is listened to where the one beside it is inactive
+    taken = Transition(id=Transition.TRANSITION_DEACTIVATE)
+    assert valve.call(ChangeState, 'estimator/change_state', transition=taken).success
+    other = graph.create_publisher(Estimate, 'estimate', qos.SAMPLES)
+    assert peer.wait(lambda: other.get_subscription_count() == 2)
+    judged = int(values(valve, 'detector')['Estimates judged'])
+    message = heard['estimate'][-1]
+    for n in range(1, 21):
+        set_stamp(message.header.stamp, valve.sent[-1] + n * 1_000_000)
+        other.publish(message)
+    assert peer.wait(lambda: int(values(valve, 'detector')['Estimates judged']) == judged + 20)
+    graph.destroy_publisher(other)
+    taken = Transition(id=Transition.TRANSITION_ACTIVATE)
+    assert valve.call(ChangeState, 'estimator/change_state', transition=taken).success
 
     # a detector that is inactive judges nothing, and goes on where it is told to
     valve.calm()

@@ -3,7 +3,7 @@
 """Node `detector`: residual against threshold, fault flag and events of one actuator."""
 
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
 
 from damadics_msgs.msg import Estimate as EstimateMessage
@@ -18,7 +18,7 @@ from damadics_fd.core.modes import PHASE_INIT, PHASE_MONITOR
 from damadics_fd.core.text import SENTENCE, plain
 from damadics_fd.nodes.alarm_memory import AlarmMemory
 from damadics_fd.nodes.detector_report import report_of
-from damadics_fd.nodes.joint import Joints, News, Taker
+from damadics_fd.nodes.joint import Joints, News, Outside, Taker
 from damadics_fd.nodes.managed import MonitoringNode
 from damadics_fd.nodes.operator import OperatorActions, OperatorServices
 from damadics_fd.nodes.partial_strokes import PartialStrokes, declared_limits
@@ -35,7 +35,6 @@ from damadics_fd.ros.conversions import (
 from damadics_fd.ros.diagnostics import Level, Report
 from damadics_fd.ros.entities import ASKED_EVERY
 from damadics_fd.ros.judged_samples import JudgedSamples
-from damadics_fd.ros.raw import any_estimate, stamp_of
 from damadics_fd.ros.spin import spin
 from damadics_fd.store.alarms import default_folder
 
@@ -136,17 +135,22 @@ class DetectorNode(MonitoringNode):
         )
         made.every(min(self.watch.timeout / 5.0, HEARTBEAT), self._look)
         made.every(HEARTBEAT, self._beat)
-        self._join(self.watch.subscribe(EstimateMessage, self._read, self._take, qos.SAMPLES))
+        self._join()
         self._publish_flag()
 
-    def _join(self, heard: Callable[[Estimate, str], None]) -> None:
+    def _join(self) -> None:
         """Take estimates of an estimator in this process directly; errors as from a topic."""
-        take = self.entities.contained('estimate', heard)
+        source = self.watch.input(
+            EstimateMessage, lambda data: self._taker.read(data), self._take, qos.SAMPLES
+        )
+        take = self.entities.contained('estimate', source.hand)
         hear = self.entities.contained('isolation', self._hear)
         judged = self.entities.contained('estimate', self._judged_beside)
         self._taker = Taker(take, hear, self, judged)
         joint = self._joints.at(self.resolve_topic_name('estimate'))
         self.entities.on_release(joint.join(self._taker))
+        self._outside = Outside(joint, self._taker, self.watch, source.subscribe)
+        self._outside.look()
         if self.settings.mode == 'scada':  # there the estimator knows the cause
             self.entities.subscription(
                 Isolation,
@@ -160,11 +164,6 @@ class DetectorNode(MonitoringNode):
         if self.active:
             self._tell(self._live.tell((), judgement), self._flag.header.frame_id)
             self._decision = self._core.decision if self._decision else None
-
-    def _read(self, data: bytes) -> tuple[Estimate, str] | None:
-        if self._taker.is_echo(stamp_of(data)):
-            return None
-        return any_estimate(data)
 
     def _folder_of(self, given: str, own: str = '') -> Path | None:
         """Return the folder that a parameter means; `own` is the part of this valve in `auto`."""
@@ -302,6 +301,7 @@ class DetectorNode(MonitoringNode):
     def _beat(self) -> None:
         if self._memory.problem:
             self._memory.keep()
+        self._outside.look()
         self._publish_flag()
 
     def _publish_flag(self) -> None:

@@ -88,6 +88,7 @@ class EstimatorNode(MonitoringNode):
         self._publisher, self._listeners = made.publisher_on_request(
             EstimateMessage, 'estimate', qos.SAMPLES
         )
+        made.on_release(self._joint.enter())
         self._judgement: Judgement | None = None
         if self._core.stride:
             self._isolation = made.publisher(Isolation, 'isolation', qos.FLAG)
@@ -98,7 +99,7 @@ class EstimatorNode(MonitoringNode):
             self, made, self._actions, self._core, self.actuator, self.settings, self._path
         )
         self._reference.restore()
-        self.watch.subscribe(Measurement, SampleReader(), self._take, qos.SAMPLES)
+        self.watch.input(Measurement, SampleReader(), self._take, qos.SAMPLES).subscribe()
 
     def _take(self, sample: Sample, tag: str) -> None:
         if not self.active:
@@ -158,7 +159,7 @@ class EstimatorNode(MonitoringNode):
         core = self._core
         assert isinstance(core, Estimator)
         if news >= 0:
-            heard = self._listeners.count > 1
+            heard = self._listeners.count > taker.subscribed
             if heard:
                 taker.sent(sample.stamp)
                 self._publisher.publish(self._encoder.encode(core.latest, tag))
@@ -174,7 +175,7 @@ class EstimatorNode(MonitoringNode):
     def _give(self, estimate: Estimate, tag: str) -> None:
         """Hand an estimate to the detector beside, and publish it for whoever else listens."""
         takers = self._joint.takers
-        if not takers or self._listeners.count > len(takers):
+        if not takers or self._joint.heard(self._listeners.count):
             for taker in takers:
                 taker.sent(estimate.stamp)
             self._publisher.publish(self._encoder.encode(estimate, tag))

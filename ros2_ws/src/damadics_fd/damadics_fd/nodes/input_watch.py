@@ -5,7 +5,7 @@
 import math
 import time
 from collections.abc import Callable
-from typing import Protocol, TypeVar
+from typing import Generic, NamedTuple, Protocol, TypeVar
 
 from rclpy.event_handler import QoSMessageLostInfo as Lost
 from rclpy.event_handler import QoSRequestedIncompatibleQoSInfo as Incompatible
@@ -33,6 +33,13 @@ class Stamped(Protocol):
 
 
 S = TypeVar('S', bound=Stamped)
+
+
+class Input(NamedTuple, Generic[S]):
+    """What an input is taken by."""
+
+    hand: Callable[[S, str], None]  # takes what a watch in this process has let through
+    subscribe: Callable[[], Callable[[], None]]  # takes what DDS brings; returns what ends that
 
 
 class InputWatch:
@@ -79,22 +86,22 @@ class InputWatch:
         self._mismatch = ''
         self._timer = entities.timer(FIRST_WORD, self._remind)
 
-    def subscribe(
+    def input(
         self,
         kind: type,
         read: Callable[[bytes], tuple[S, str] | None],
         take: Callable[[S, str], None],
         profile: QoSProfile,
-    ) -> Callable[[S, str], None]:
+    ) -> Input[S]:
         """
-        Subscribe to the input.
+        Say what the input is and who takes it.
 
         :param kind: type of its messages, which have a header.
         :param read: returns what a serialised message carries and its tag; None: ignore it.
         :param take: called with each; not with one whose stamp alone runs far ahead.
         :param profile: quality of service; no deadline, for a publisher that offers none would
             then not be heard at all.
-        :return: takes what a watch in this process has let through.
+        :return: what it is taken by; nothing is subscribed to as yet.
         """
         jumps: ForwardJumps[S] = ForwardJumps()
         self._far = lambda: jumps.refused
@@ -133,8 +140,10 @@ class InputWatch:
         events = SubscriptionEventCallbacks(
             incompatible_qos=self._incompatible, message_lost=self._count_lost
         )
-        self._entities.subscription(kind, self._topic, arrived, profile, events, raw=True)
-        return handed
+        subscription = self._entities.subscription
+        return Input(
+            handed, lambda: subscription(kind, self._topic, arrived, profile, events, raw=True)
+        )
 
     def heard_beside(self, other: 'InputWatch') -> None:
         """

@@ -7,6 +7,7 @@ Over DDS this hop costs more than everything else that a sample needs.
 """
 
 import math
+import time
 from collections import deque
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
@@ -16,8 +17,10 @@ from damadics_fd.core.decision.detector import Detector
 from damadics_fd.core.judgement import Judgement
 from damadics_fd.nodes.input_watch import InputWatch
 from damadics_fd.ros.process.rounds import Rounds
+from damadics_fd.ros.raw import any_estimate, stamp_of
 
 MOST_ECHOES = 100_000  # as many as the queue of samples holds
+LINGERING = 5.0  # s that a subscription is kept which is not needed any more
 
 
 class News(NamedTuple):
@@ -62,6 +65,7 @@ class Taker:
         judged: Callable[[int, str, News], None] = lambda stamp, tag, news: None,
     ) -> None:
         self.take, self.hear, self.beside, self.judged = take, hear, beside, judged
+        self.subscribed = False  # DDS brings it estimates too
         self._echoes: deque[int] = deque(maxlen=MOST_ECHOES)
         self.ordinary = 0  # samples that `judged` was not called for
         self.tag = ''  # that it was called with
@@ -85,11 +89,31 @@ class Taker:
 
     def sent(self, stamp: int) -> None:
         """
-        Note an estimate that was also published: DDS will bring it to this detector too.
+        Note an estimate that was also published: DDS will bring it to who subscribes to it too.
 
         :param stamp: of the estimate [ns].
         """
-        self._echoes.append(stamp)
+        if self.subscribed:
+            self._echoes.append(stamp)
+
+    def listen(self, subscribed: bool) -> None:
+        """
+        Note whether DDS brings estimates from now on.
+
+        :param subscribed: whether it does.
+        """
+        self.subscribed = subscribed
+        self._echoes.clear()
+
+    def read(self, data: bytes) -> tuple[Estimate, str] | None:
+        """
+        Read what DDS brings.
+
+        :param data: a serialised Estimate.
+        :return: the estimate and its tag; None where it was handed over already.
+        :raises ValueError: where it is no Estimate.
+        """
+        return None if self.is_echo(stamp_of(data)) else any_estimate(data)
 
     def is_echo(self, stamp: int | None) -> bool:
         """
@@ -106,9 +130,10 @@ class Taker:
 
 
 class Joint:
-    """Hold the detectors of one process that take the estimates of one topic."""
+    """Hold what one process has of one topic: detectors that take the estimates, estimators."""
 
     def __init__(self) -> None:
+        self.estimators = 0  # that publish on it
         self.takers: list[Taker] = []
         self.only: Taker | None = None  # where there is one
 
@@ -127,6 +152,28 @@ class Joint:
         self.takers.append(taker)
         self._count()
         return leave
+
+    def enter(self) -> Callable[[], None]:
+        """
+        Add an estimator.
+
+        :return: takes it away again.
+        """
+
+        def leave() -> None:
+            self.estimators -= 1
+
+        self.estimators += 1
+        return leave
+
+    def heard(self, subscriptions: int) -> bool:
+        """
+        Tell whether others than these detectors subscribe.
+
+        :param subscriptions: to the topic.
+        :return: True if so.
+        """
+        return subscriptions > sum(taker.subscribed for taker in self.takers)
 
     def _count(self) -> None:
         self.only = self.takers[0] if len(self.takers) == 1 else None
@@ -149,6 +196,47 @@ class Joint:
         """
         for taker in self.takers:
             taker.hear(judgement)
+
+
+class Outside:
+    """
+    The subscription of a detector to its estimates, only while it needs one.
+
+    What an estimator beside it publishes for others would come back to it through DDS, and cost
+    more than all that a sample needs else. So it subscribes while there is none beside it, or
+    somebody outside this process publishes on the topic too.
+
+    :param joint: of the topic.
+    :param taker: of the detector.
+    :param watch: of the topic.
+    :param subscribe: takes what DDS brings; returns what ends that.
+    """
+
+    def __init__(
+        self,
+        joint: Joint,
+        taker: Taker,
+        watch: InputWatch,
+        subscribe: Callable[[], Callable[[], None]],
+    ) -> None:
+        self._joint, self._taker = joint, taker
+        self._watch, self._subscribe = watch, subscribe
+        self._end: Callable[[], None] | None = None  # of the subscription, where there is one
+        self._needed = -math.inf  # monotonic time when it was needed last [s]
+
+    def look(self) -> None:
+        """Subscribe where that is needed now; end it where it was not for a while."""
+        now, beside = time.monotonic(), self._joint.estimators
+        if beside == 0 or self._watch.publishers > beside:
+            self._needed = now
+        needed = now - self._needed < LINGERING
+        if needed and self._end is None:
+            self._end = self._subscribe()
+            self._taker.listen(True)
+        elif not needed and self._end is not None:
+            self._end()
+            self._end = None
+            self._taker.listen(False)
 
 
 class Joints:

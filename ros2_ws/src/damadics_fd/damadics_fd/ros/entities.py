@@ -122,7 +122,7 @@ class Entities:
         events: SubscriptionEventCallbacks | None = None,
         *,
         raw: bool = False,
-    ) -> None:
+    ) -> Callable[[], None]:
         """
         Make a subscription.
 
@@ -132,10 +132,12 @@ class Entities:
         :param profile: quality of service.
         :param events: of the middleware.
         :param raw: `take` gets the serialised message.
+        :return: ends it before all else is released.
         """
+        ended = False
 
         def taken(message: M) -> None:  # as `contained`, for one argument: half the cost
-            if self._alive:
+            if self._alive and not ended:
                 try:
                     take(message)
                 except Exception as error:
@@ -147,7 +149,18 @@ class Entities:
         made = self._node.create_subscription(
             kind, topic, taken, profile, event_callbacks=events, raw=raw
         )
-        self._undo.append(lambda: self._node.destroy_subscription(made))
+
+        def undo() -> None:
+            self._node.destroy_subscription(made)
+
+        def end() -> None:
+            nonlocal ended
+            ended = True
+            self._undo.remove(undo)
+            undo()
+
+        self._undo.append(undo)
+        return end
 
     def contained(self, name: str, take: Callable[P, None]) -> Callable[P, None]:
         """

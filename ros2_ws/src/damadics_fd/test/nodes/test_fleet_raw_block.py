@@ -9,7 +9,7 @@ import pytest
 from damadics_fd.core.sample import SIGNALS
 
 pytest.importorskip('damadics_msgs.msg')
-from damadics_fd.nodes.fleet.raw_block import block_of, read_block
+from damadics_fd.nodes.fleet.raw_block import BlockReader, block_of, read_block
 from damadics_msgs.msg import MeasurementBlock
 from rclpy.serialization import deserialize_message, serialize_message
 
@@ -60,3 +60,61 @@ def test_what_is_no_block_is_refused_and_never_read_beyond_its_end():
         except ValueError:
             continue
         assert sum(map(len, found.signals.values())) * 8 <= len(noise)
+
+
+def same_form(rng, message):
+    """Give a block other stamps and signals, as the next one of its sender has."""
+    message.header.stamp.sec += 1
+    message.stamp = array.array('q', rng.integers(0, 2**60, len(message.stamp)).tobytes())
+    for name in SIGNALS:
+        size = len(getattr(message, name))
+        setattr(message, name, array.array('d', rng.normal(size=size).tobytes()))
+
+
+def test_a_reader_of_blocks_reads_each_alike_whatever_came_before():
+    rng, read = np.random.default_rng(3), BlockReader()
+    quick = 0
+    for sender in ('a', 'gateway', 'a', 'b'):
+        message = some_block(rng, sender)
+        for _ in range(5):
+            same_form(rng, message)
+            data = serialize_message(message)
+            before = getattr(read, '_block', None)
+            found = read(data)
+            quick += found is before
+            assert told(found) == told(read_block(data))
+            assert all(column.flags.aligned for column in found.signals.values())
+    assert quick == 4 * 3  # the first of a form is read as any, the second is kept
+
+
+def test_a_block_of_the_same_size_and_another_form_is_read_as_it_is():
+    rng, read = np.random.default_rng(5), BlockReader()
+    message = some_block(rng, 'gateway')
+    for name, size in zip(SIGNALS, (2, 3, 0, 1, 2, 3, 2), strict=True):
+        setattr(message, name, array.array('d', rng.normal(size=size).tobytes()))
+    for _ in range(3):
+        read(serialize_message(message))
+    kept = serialize_message(message)
+    message.cv, message.x1 = message.x1, message.cv
+    for change in ('columns', 'layout', 'sender'):
+        if change == 'layout':
+            message.layout ^= 1
+        elif change == 'sender':
+            message.header.frame_id = 'getaway'
+        data = serialize_message(message)
+        assert len(data) == len(kept)
+        assert told(read(data)) == told(read_block(data))
+        assert told(read(kept)) == told(read_block(kept))
+    for _ in range(500):  # whatever is wrong is wrong for both
+        noise = bytearray(kept)
+        for at in rng.integers(0, len(kept), 3):
+            noise[at] = rng.integers(256)
+        try:
+            expected = told(read_block(bytes(noise)))
+        except ValueError:
+            with pytest.raises(ValueError):
+                read(bytes(noise))
+        else:
+            np.testing.assert_equal(told(read(bytes(noise))), expected)
+        read(kept)
+        assert told(read(kept)) == told(read_block(kept))

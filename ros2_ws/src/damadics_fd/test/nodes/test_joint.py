@@ -6,6 +6,7 @@ import pytest
 
 pytest.importorskip('damadics_msgs.msg')
 from damadics_fd.core.approximator.state import Estimate as CoreEstimate
+from damadics_fd.nodes import joint
 from damadics_fd.nodes.joint import Joints, Taker
 from damadics_fd.ros.raw import (
     Encoder,
@@ -22,6 +23,9 @@ from rclpy.serialization import deserialize_message, serialize_message
 
 def test_an_echo_is_known_once():
     taker = Taker(lambda estimate, tag: None)
+    taker.sent(1)  # it does not subscribe: nothing of this comes again
+    assert not taker.is_echo(1)
+    taker.listen(True)
     for stamp in (1, 2, 3):
         taker.sent(stamp)
     assert taker.is_echo(1)
@@ -29,6 +33,67 @@ def test_an_echo_is_known_once():
     assert taker.is_echo(3)
     assert not taker.is_echo(2)  # 2 was lost on the way: what has its stamp now is another's
     assert not taker.is_echo(None)
+    taker.sent(4)
+    taker.listen(False)
+    taker.listen(True)
+    assert not taker.is_echo(4)
+
+
+class Graph:
+    """A topic with some publishers, and whether the detector subscribes to it."""
+
+    def __init__(self, monkeypatch) -> None:
+        self.publishers, self.subscribed, self.now = 0, False, 1000.0
+        monkeypatch.setattr(joint.time, 'monotonic', lambda: self.now)
+
+    def subscribe(self):
+        assert not self.subscribed
+        self.subscribed = True
+        return self.end
+
+    def end(self) -> None:
+        assert self.subscribed
+        self.subscribed = False
+
+
+def test_a_detector_subscribes_while_somebody_outside_sends(monkeypatch):
+    graph, both = Graph(monkeypatch), joint.Joint()
+    taker = Taker(lambda estimate, tag: None)
+    both.join(taker)
+    leave, graph.publishers = both.enter(), 1
+    outside = joint.Outside(both, taker, graph, graph.subscribe)
+    outside.look()
+    assert not graph.subscribed
+    assert not taker.subscribed
+    assert not both.heard(0)
+    assert both.heard(1)
+
+    graph.publishers = 2
+    outside.look()
+    outside.look()
+    assert graph.subscribed
+    assert taker.subscribed
+    assert not both.heard(1)  # that is the detector itself
+    assert both.heard(2)
+
+    graph.publishers = 1
+    for later, subscribed in ((0.5 * joint.LINGERING, True), (joint.LINGERING, False)):
+        graph.now += later
+        outside.look()
+        assert graph.subscribed == taker.subscribed == subscribed
+
+    leave()  # no estimator is left in the process: one may come anywhere
+    graph.publishers = 0
+    outside.look()
+    assert graph.subscribed
+
+
+def test_a_detector_without_an_estimator_beside_it_subscribes_at_once(monkeypatch):
+    graph, alone = Graph(monkeypatch), joint.Joint()
+    taker = Taker(lambda estimate, tag: None)
+    joint.Outside(alone, taker, graph, graph.subscribe).look()
+    assert graph.subscribed
+    assert taker.subscribed
 
 
 def test_a_joint_is_of_one_topic():

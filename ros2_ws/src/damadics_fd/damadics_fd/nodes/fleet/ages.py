@@ -40,6 +40,7 @@ class Ages:
         self._window = np.zeros(count)  # when the present window began [s]
         self._lowest = np.full(count, np.inf)  # delay in it [s]
         self._before = np.full(count, np.inf)  # delay in the one before [s]
+        self._dated = False  # the stamps of all valves are dates
         self._even = False  # no valve is paused, and of each the time between blocks is known
 
     def heard(self, valve: Ints, stamp: Ints, steady: float) -> None:
@@ -50,7 +51,8 @@ class Ages:
         :param stamp: of the measurements [ns], shape (n,); those of a valve in order.
         :param steady: time of a clock that is never set [s].
         """
-        if len(stamp) and int(stamp.min()) >= DATE and int(self._stamp[valve].min()) >= DATE:
+        dated = len(stamp) > 0 and bool(stamp.min() >= DATE)
+        if dated and (self._dated or bool(self._stamp[valve].min() >= DATE)):
             self._stamp[valve] = stamp  # the last of each valve; the clock alone tells its age
             return
         newest = np.full(len(self._stamp), -1, np.int64)
@@ -64,7 +66,7 @@ class Ages:
         if self._even and not (first | (gap > np.maximum(INTERRUPTED, MISSED * usual))).any():
             self._usual[v] = usual + 0.2 * (gap - usual)
             self._least[v] = np.minimum(self._least[v], delay)
-            self._stamp[v], self._delay[v], self._steady[v] = now, delay, steady
+            self._note(v, now, delay, steady)
             return
         known = np.isfinite(usual)
         usually = np.where(known, usual, 0.0)
@@ -75,9 +77,13 @@ class Ages:
         usual = np.where(~first & ~paused & known, usual + 0.2 * (gap - usually), usual)
         self._usual[v] = np.where(~first & ~known, gap, usual)
         self._least[v] = np.minimum(np.where(first, delay, self._least[v]), delay)
-        self._stamp[v], self._delay[v], self._steady[v] = now, delay, steady
+        self._note(v, now, delay, steady)
         self._forgive(v[self._pause[v] > 0.0], steady)
         self._even = bool(np.isfinite(self._usual).all()) and not self._pause.any()
+
+    def _note(self, v: Ints, stamp: Ints, delay: Floats, steady: float) -> None:
+        self._stamp[v], self._delay[v], self._steady[v] = stamp, delay, steady
+        self._dated = bool(self._stamp.min() >= DATE)
 
     def _forgive(self, v: Ints, steady: float) -> None:
         """Count a pause as none where samples run on with an even delay, which no queue has."""

@@ -101,16 +101,18 @@ def check(
         processes judge are neither.
     """
     own = block.layout == version
+    index, stamp = block.valve.astype(np.int64), block.stamp
+    n = len(index)
+    signals = {name: column for name, column in block.signals.items() if len(column)}
+    even = len(stamp) == n and all(len(column) == n for column in signals.values())
+    if own and even and 0 < n <= MOST_ROWS and index.max() < count and stamp.min() >= 0:
+        return Rows(index, stamp, signals), []  # as nearly every block
     numbers = np.arange(count) if own else others.numbers(block.layout) if others else None
     if numbers is None:
         # the indices mean other valves there
         return nothing(), [Refusal(LAYOUT, np.empty(0, np.int64))]
-    index, stamp = block.valve.astype(np.int64), block.stamp
-    signals = {name: column for name, column in block.signals.items() if len(column)}
-    wrong = [LENGTHS] if any(len(x) != len(index) for x in (stamp, *signals.values())) else []
-    wrong += [ROWS] if len(index) > MOST_ROWS else []
-    if own and not wrong and len(index) and int(index.max()) < count and int(stamp.min()) >= 0:
-        return Rows(index, stamp, signals), []  # as nearly every block
+    wrong = [] if even else [LENGTHS]
+    wrong += [ROWS] if n > MOST_ROWS else []
     valve = np.full(len(index), UNNAMED)
     valve[index < len(numbers)] = numbers[index[index < len(numbers)]]
     if wrong:

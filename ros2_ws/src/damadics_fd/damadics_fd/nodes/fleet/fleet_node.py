@@ -21,7 +21,7 @@ from damadics_fd.nodes.fleet.handover import Handover
 from damadics_fd.nodes.fleet.jumps import Jumps
 from damadics_fd.nodes.fleet.keeping import Keeping, Operated
 from damadics_fd.nodes.fleet.members import Happening, Members, members_of
-from damadics_fd.nodes.fleet.raw_block import read_block
+from damadics_fd.nodes.fleet.raw_block import BlockReader
 from damadics_fd.nodes.fleet.services import FleetServices
 from damadics_fd.nodes.fleet.signatures import Signatures
 from damadics_fd.nodes.fleet.strokes import FleetStrokes
@@ -109,6 +109,7 @@ class FleetNode(SpinnableNode):
             [one.namespace for one in self._members.all],
             [one.actuator for one in self._members.all],
         )
+        self._read = BlockReader()
         self._others = blocks.OtherLayouts([one.namespace for one in self._members.all])
         self._gathered: list[tuple[int, Sample]] = []
         self._jumps = Jumps(len(self._members))
@@ -156,7 +157,7 @@ class FleetNode(SpinnableNode):
 
     def _take_block(self, data: bytes) -> None:
         try:
-            block = read_block(data)
+            block = self._read(data)
         except ValueError as problem:
             self.get_logger().error(f'no block: {problem}', throttle_duration_sec=10.0)
             self._refuse([blocks.Refusal(blocks.UNREADABLE, np.empty(0, np.int64))], '')

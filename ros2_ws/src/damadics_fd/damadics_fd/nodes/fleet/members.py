@@ -137,6 +137,8 @@ class Members:
         place = rows.valve if alone else self._place[rows.valve]
         changes = self.banks[b].take(place, rows.stamp, rows.signals)
         refused = int(np.count_nonzero(changes.reason))
+        if not len(changes.row):  # as nearly always
+            return Taken([], refused, set())
         told = np.flatnonzero(changes.decisions['transitions'])
         happened = [
             Happening(int(rows.valve[changes.row[n]]), event)
