@@ -2,7 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the system tests share: a domain of their own, processes, a node of the test."""
 
+import contextlib
 import os
+import random
+import socket
 import time
 from pathlib import Path
 from typing import NamedTuple
@@ -111,6 +114,15 @@ def promised(seconds: float) -> float:
         rest += n * n % 7
     slower = (time.perf_counter() - began) / QUIET
     return seconds * max(1.0, slower, os.getloadavg()[0] / (os.cpu_count() or 1))
+
+
+def free_port() -> int:
+    """Find a port for a server that starts later: no client is given one below 32768 meanwhile."""
+    while True:
+        port = random.SystemRandom().randrange(10_000, 32_000)
+        with socket.socket() as probe, contextlib.suppress(OSError):
+            probe.bind(('127.0.0.1', port))
+            return port
 
 
 def alone(patch: pytest.MonkeyPatch, folder: Path) -> int:

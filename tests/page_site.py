@@ -11,7 +11,7 @@ from typing import Any
 
 import rclpy
 import website
-from conftest import alone
+from conftest import alone, free_port
 from damadics_bringup.processes import Processes, surroundings
 from damadics_fd.ros import qos
 from damadics_msgs.msg import (
@@ -128,7 +128,7 @@ class Site:
         self.processes = Processes(folder / 'logs', surroundings(domain))
         self.processes.__enter__()
         self.processes.forget('PYTEST_CURRENT_TEST')
-        port = website.free_port()
+        port = free_port()
         self.address = f'http://127.0.0.1:{port}'
         self._arguments = ['--port', str(port), '--state', str(self.state), *(arguments or [])]
         self.start()

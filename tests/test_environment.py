@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from conftest import PATIENCE
 
 ROOT = Path(__file__).resolve().parents[1]
 STAND_IN = ROOT / 'tools' / 'bin' / 'ros2'
@@ -21,7 +22,12 @@ def shell(command: str) -> subprocess.CompletedProcess[str]:
     """Run a command in a new bash that knows nothing of this process but the home."""
     clean = {'PATH': '/usr/local/bin:/usr/bin:/bin', 'HOME': os.environ.get('HOME', '/')}
     return subprocess.run(
-        ['bash', '-c', command], cwd='/', env=clean, capture_output=True, text=True, timeout=60
+        ['bash', '-c', command],
+        cwd='/',
+        env=clean,
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
     )
 
 
@@ -155,7 +161,7 @@ def fresh(tmp_path):
             env={**os.environ, 'ROS_DISTRO': '', **environment},
             capture_output=True,
             text=True,
-            timeout=60,
+            timeout=PATIENCE,
         )
 
     return run
@@ -185,7 +191,7 @@ def test_setup_is_done_once_only():
         env=clean,
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=PATIENCE,
     )
     assert (done.returncode, done.stdout) == (0, ''), done.stderr
 

@@ -16,7 +16,7 @@ from types import SimpleNamespace
 import pytest
 import website
 import yaml
-from conftest import Peer, alone, children, promised
+from conftest import PATIENCE, Peer, alone, children, free_port, promised
 from damadics_bringup.processes import Processes, executable, surroundings
 from damadics_fd.ros import qos
 from damadics_msgs.msg import FaultEvent, FaultFlag
@@ -37,7 +37,7 @@ def chromium():
 def first(tmp_path_factory, chromium):
     """The one command, the page it serves, and a node that listens."""
     folder = tmp_path_factory.mktemp('first_look')
-    port = website.free_port()
+    port = free_port()
     fleet = folder / 'fleet.yaml'
     fleet.write_text(
         yaml.safe_dump(
@@ -107,7 +107,7 @@ def replayed(*words: object, code: int = 0) -> list[dict]:
         [executable('damadics_fd', 'replay'), *map(str, words), '--jobs', '1', '--out', str(out)],
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=PATIENCE,
     )
     assert done.returncode == code, done.stderr
     return json.loads(out.read_text())
@@ -120,7 +120,7 @@ QUICKLY = [f'--set={name}={value}' for name, value in website.LEARN_QUICKLY.item
 def faulted(first):
     """The same once its friction is flagged."""
     healthy = (FaultFlag.STATE_HEALTHY,)
-    assert first.peer.wait(lambda: first.flags and first.flags[-1].state in healthy, 120.0)
+    assert first.peer.wait(lambda: first.flags and first.flags[-1].state in healthy)
     first.tile.wait(('ok',))
     first.early = rises(first)
     answer = first.peer.call(InjectFault, f'/{VALVE}/inject_fault', fault=FRICTION, strength=1.0)
@@ -190,7 +190,7 @@ def test_a_truncated_bag_is_replayed(ended):
         [executable('damadics_fd', 'verify'), str(torn)],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=PATIENCE,
     )
     assert verdict.returncode == 3, verdict.stdout
     (result,) = replayed(torn, *QUICKLY, code=3)  # something is missing

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 import website
 import yaml
-from conftest import Peer
+from conftest import PATIENCE, Peer, free_port
 from damadics_bringup.processes import executable
 from damadics_fd.ros import qos
 from damadics_msgs.msg import Measurement, Signature
@@ -94,7 +94,7 @@ def command(package: str, name: str, *words: object, **options) -> str:
         [executable(package, name), *map(str, words)],
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=PATIENCE,
         **options,
     )
     assert done.returncode == 0, f'{name}: {done.stderr}{done.stdout}'
@@ -117,9 +117,9 @@ def test_from_nothing_to_a_report_on_a_fault(reader, peer, processes, tmp_path):
     bag = tmp_path / 'good'
     processes.start('damadics_fd', 'recorder', [f'/{VALVE}/measurement', '--out', str(bag)])
     taken = peer.listen(Measurement, f'/{VALVE}/measurement', qos.SAMPLES)
-    assert peer.wait(lambda: peer.node.count_subscribers(f'/{VALVE}/measurement') > 1, 30.0)
+    assert peer.wait(lambda: peer.node.count_subscribers(f'/{VALVE}/measurement') > 1)
     reader.send(RECORDED, FASTER)
-    assert peer.wait(lambda: len(taken) >= RECORDED * RATE * 0.9, 30.0)
+    assert peer.wait(lambda: len(taken) >= RECORDED * RATE * 0.9)
     processes.end('recorder')
     file = plant / f'{VALVE}.param.yaml'
     said = command('damadics_fd', 'commission', bag, '--actuator', TAG, '--out', file)
@@ -129,7 +129,7 @@ def test_from_nothing_to_a_report_on_a_fault(reader, peer, processes, tmp_path):
     fleet = yaml.safe_load((plant / 'fleet.yaml').read_text())
     fleet['valves'][VALVE]['settings'].update(website.LEARN_QUICKLY)
     (plant / 'fleet.yaml').write_text(yaml.safe_dump(fleet))
-    port = website.free_port()
+    port = free_port()
     processes.forget('PYTEST_CURRENT_TEST')
     words = [str(plant / 'fleet.yaml'), '--dashboard', '--port', str(port)]
     processes.start('damadics_bringup', 'run', [*words, '--logs', str(tmp_path / 'logs')])
@@ -138,18 +138,18 @@ def test_from_nothing_to_a_report_on_a_fault(reader, peer, processes, tmp_path):
     reader.go_on()
     tile = website.Tile(address, VALVE)
     learned = peer.listen(Signature, f'/{VALVE}/signature', qos.FLAG)
-    tile.wait(('ok',), 90.0)
+    tile.wait(('ok',))
     explains = Signature.STATE_VERIFY, Signature.STATE_MONITOR
-    assert peer.wait(lambda: learned and learned[-1].state in explains, 60.0)
+    assert peer.wait(lambda: learned and learned[-1].state in explains)
 
     reader.stick()
-    tile.wait(website.ALARM, 60.0)
+    tile.wait(website.ALARM)
     alarm = ''
     deadline = time.monotonic() + 60.0
     while 'friction' not in alarm and time.monotonic() < deadline:
         time.sleep(0.3)
         with urllib.request.urlopen(
-            f'{address}/report?of={VALVE}&days=1&as=csv', timeout=10.0
+            f'{address}/report?of={VALVE}&days=1&as=csv', timeout=PATIENCE
         ) as answer:
             alarm = answer.read().decode('utf-8-sig')
     assert 'friction' in alarm, alarm

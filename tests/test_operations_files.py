@@ -16,6 +16,7 @@ from types import ModuleType, SimpleNamespace
 import pytest
 import yaml
 from ament_index_python.packages import get_package_share_directory
+from conftest import PATIENCE
 from damadics_bringup.launcher import tasks_of
 from damadics_bringup.policy import policy
 from damadics_bringup.processes import executable, parameters
@@ -170,7 +171,7 @@ def test_the_parameter_file_is_taken_by_the_node(name, tmp_path):
     """A wrong parameter beside the file is the only complaint."""
     wrong = [*parameters(no_such='x'), '--params-file', str(SHARE / 'config/valve.param.yaml')]
     done = subprocess.run(
-        [executable('damadics_fd', name), *wrong], capture_output=True, text=True, timeout=60
+        [executable('damadics_fd', name), *wrong], capture_output=True, text=True, timeout=PATIENCE
     )
     assert done.returncode == 2
     complaints = [line for line in done.stderr.splitlines() if line.startswith('  ')]
@@ -187,7 +188,7 @@ def test_replay_takes_the_arguments_that_launch_adds(tmp_path):
         '--enclave',
         '/replay',
     ]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
     assert 'unrecognized arguments' not in done.stderr
     assert 'none.mcap' in done.stderr
 
@@ -284,7 +285,7 @@ def secured(tmp_path_factory):
         '--out',
         str(folder / 'policy.xml'),
     ]
-    subprocess.run(command, check=True, timeout=60)
+    subprocess.run(command, check=True, timeout=PATIENCE)
     return folder / 'policy.xml'
 
 
@@ -342,7 +343,7 @@ def test_without_keys_an_enforced_node_does_not_start(tmp_path):
         env={**os.environ, **enforced},
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=PATIENCE,
     )
     assert done.returncode != 0
     assert 'security' in done.stderr.lower() or 'keystore' in done.stderr.lower()

@@ -4,7 +4,6 @@
 
 import json
 import os
-import socket
 import time
 import urllib.error
 import urllib.request
@@ -40,17 +39,11 @@ LEARN_QUICKLY = {'t_on': 1.0, 't_w': 3.0, 't_learn': 8.0, 'travel_min': 0.1}
 PLANT = {'scenario': 'random_nominal', 'model': 'lugre', 'rate': 200.0, 'seed': 1}
 
 
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(('127.0.0.1', 0))
-        return probe.getsockname()[1]
-
-
 def wait_until_served(address: str, patience: float = PATIENCE) -> None:
     deadline = time.monotonic() + patience
     while time.monotonic() < deadline:
         try:
-            urllib.request.urlopen(address, timeout=5.0).close()
+            urllib.request.urlopen(address, timeout=PATIENCE).close()
             return
         except (urllib.error.URLError, OSError):
             time.sleep(0.2)
@@ -107,7 +100,7 @@ class Tile:
             return self._page.evaluate(
                 f"document.querySelector('[data-valve={self._valve}]')?.dataset.kind || ''"
             )
-        with urllib.request.urlopen(f'{self._address}/state', timeout=5.0) as answer:
+        with urllib.request.urlopen(f'{self._address}/state', timeout=PATIENCE) as answer:
             return json.load(answer).get(self._valve, '')
 
     def wait(self, kinds: tuple[str, ...], patience: float = PATIENCE) -> float:
@@ -128,5 +121,5 @@ class Tile:
                 f"document.querySelector('[data-valve={self._valve}]')?.innerText"
                 " + ' (link ' + document.body.dataset.link + ')'"
             )
-        with urllib.request.urlopen(f'{self._address}/state', timeout=5.0) as answer:
+        with urllib.request.urlopen(f'{self._address}/state', timeout=PATIENCE) as answer:
             return f'{words!r}; the server says {answer.read().decode()}'

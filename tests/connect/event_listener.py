@@ -7,11 +7,11 @@ Prints a line for each state and transition, and one when two seconds have passe
 it connects again, and says which message was its last.
 """
 
-import json
 import sys
 import time
 
 import httpx
+from event_stream import messages
 
 SILENT = 2.0  # s: a valve is grey from then on
 
@@ -22,17 +22,9 @@ def main() -> None:
         headers = {'Last-Event-ID': number} if number else {}
         try:
             with httpx.stream('GET', url, headers=headers, timeout=SILENT) as stream:
-                name = ''
-                for line in stream.iter_lines():
-                    field, _, value = line.partition(': ')
-                    if field == 'id':
-                        number = value
-                    elif field == 'event':
-                        name = value
-                    elif field == 'data':
-                        told = json.loads(value)
-                        what = told['state'] if name == 'valve' else told['transition']
-                        say(name, told['valve'], what, number)
+                for number, name, told in messages(stream.iter_lines()):
+                    what = told['state'] if name == 'valve' else told['transition']
+                    say(name, told['valve'], what, number)
         except httpx.HTTPError:
             say('silence')
             time.sleep(0.2)

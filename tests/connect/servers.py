@@ -13,16 +13,9 @@ import time
 from pathlib import Path
 
 import pytest
-from conftest import PATIENCE
+from conftest import PATIENCE, free_port
 
 HERE = Path(__file__).parent
-
-
-def free_port() -> int:
-    """Find a port that nobody uses."""
-    with socket.socket() as probe:
-        probe.bind(('127.0.0.1', 0))
-        return probe.getsockname()[1]
 
 
 def wait_for(condition, patience: float = PATIENCE, pause: float = 0.05) -> bool:
@@ -54,7 +47,7 @@ needs_namespace = pytest.mark.skipif(
 )
 
 
-def in_namespace(script: str, folder: Path, patience: float = 200.0) -> None:
+def in_namespace(script: str, folder: Path, patience: float = 300.0) -> None:
     """Run a script of bash in a network of its own; whatever it has started ends with it."""
     environment = {**os.environ, 'RCUTILS_LOGGING_BUFFERED_STREAM': '0'}
     process = subprocess.Popen(
@@ -88,7 +81,7 @@ class Server:
                 self._command, stdin=subprocess.PIPE, stdout=log, stderr=subprocess.STDOUT
             )
         ready = lambda: listens(self.port) or self._process.poll() is not None  # noqa: E731
-        if not wait_for(ready, 60.0):
+        if not wait_for(ready):
             self.kill()
             pytest.fail(f'{self._command} does not listen')
         assert self._process.poll() is None, self._log.read_text(errors='replace')[-2000:]

@@ -2,13 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """The HTTP interface with real clients: JSON, events, actions, roles, metrics, hostile input."""
 
-import json
 import threading
+from collections.abc import Iterator
 
 import httpx
 import pytest
+from conftest import PATIENCE, alone, free_port, promised
 from connect.detectors import Detectors
-from connect.servers import free_port, listens, wait_for
+from connect.event_stream import Message, messages
+from connect.servers import listens, wait_for
+from damadics_bringup.processes import Processes
 from damadics_fd.ros import qos
 from damadics_msgs.msg import FaultEvent, FaultFlag, FleetLayout, FleetStatus
 from prometheus_client.parser import text_string_to_metric_families
@@ -22,26 +25,23 @@ class Listener(threading.Thread):
 
     def __init__(self, url: str, **headers: str) -> None:
         super().__init__(daemon=True)
-        self.messages: list[tuple[str, str, dict]] = []
+        self.messages: list[Message] = []
         self._url, self._headers, self._over = url, headers, threading.Event()
         self._connected = threading.Event()
         self.start()
-        assert self._connected.wait(10.0)
+        assert self._connected.wait(PATIENCE)
 
     def run(self) -> None:
-        number = name = ''
-        with httpx.stream('GET', self._url, headers=self._headers, timeout=30.0) as stream:
-            for line in stream.iter_lines():
-                self._connected.set()
-                if self._over.is_set():
-                    return
-                field, _, value = line.partition(': ')
-                if field == 'id':
-                    number = value
-                elif field == 'event':
-                    name = value
-                elif field == 'data':
-                    self.messages.append((number, name, json.loads(value)))
+        with httpx.stream('GET', self._url, headers=self._headers, timeout=PATIENCE) as stream:
+            for message in messages(self._lines(stream)):
+                self.messages.append(message)
+
+    def _lines(self, stream: httpx.Response) -> Iterator[str]:
+        for line in stream.iter_lines():
+            self._connected.set()
+            if self._over.is_set():
+                return
+            yield line
 
     def close(self) -> None:
         self._over.set()
@@ -50,9 +50,6 @@ class Listener(threading.Thread):
 
 @pytest.fixture(scope='module')
 def served(tmp_path_factory):
-    from conftest import alone
-    from damadics_bringup.processes import Processes
-
     folder = tmp_path_factory.mktemp('http')
     patch = pytest.MonkeyPatch()
     domain = alone(patch, folder)
@@ -63,11 +60,11 @@ def served(tmp_path_factory):
     with Processes(folder / 'logs') as processes:
         processes.start('damadics_connect', 'http', [str(folder / 'http.yaml')])
         log = processes.log('http')
-        assert wait_for(lambda: listens(port), 30.0), log.read_text()
+        assert wait_for(lambda: listens(port)), log.read_text()
         client = httpx.Client(
             base_url=f'http://127.0.0.1:{port}',
             headers={'Authorization': f'Bearer {OPERATOR}'},
-            timeout=10.0,
+            timeout=PATIENCE,
         )
         assert wait_for(lambda: len(client.get('/api/fleet').json()) == 3)
         yield client, detectors, log
@@ -211,7 +208,8 @@ def test_silence_of_a_detector_is_not_health(served):
     client, detectors, _ = served
     detectors.silence()
     assert wait_for(
-        lambda: {row['state'] for row in client.get('/api/fleet').json()} == {'not_monitored'}, 5.0
+        lambda: {row['state'] for row in client.get('/api/fleet').json()} == {'not_monitored'},
+        promised(5.0),
     )
     families = {f.name: f for f in text_string_to_metric_families(client.get('/metrics').text)}
     assert {s.value for s in families['damadics_monitored'].samples} == {0.0}
@@ -234,10 +232,10 @@ def test_valves_of_a_fleet_are_told_from_its_status_alone(served):
         status.publish(told)
         return {each['valve']: each for each in client.get('/api/fleet').json()}
 
-    assert wait_for(lambda: 'unit/lv201' in valves(), 10.0, 0.3)
+    assert wait_for(lambda: 'unit/lv201' in valves(), pause=0.3)
     found = valves()
     assert (found['unit/lv201']['state'], found['unit/lv201']['cause']) == ('alarm', 'friction_up')
     assert found['unit/lv202']['state'] == 'healthy' and found['unit/lv202']['area'] == 'Unit'
     assert not any('no such valve' in str(each) for each in found.values())
     silent = lambda: {v['valve']: v for v in client.get('/api/fleet').json()}  # noqa: E731
-    assert wait_for(lambda: silent()['unit/lv202']['state'] == 'not_monitored', 10.0, 0.2)
+    assert wait_for(lambda: silent()['unit/lv202']['state'] == 'not_monitored', pause=0.2)

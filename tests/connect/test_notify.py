@@ -7,6 +7,7 @@ import subprocess
 import time
 
 import pytest
+from conftest import PATIENCE
 from connect.detectors import Detectors
 from connect.servers import Server, wait_for
 from damadics_bringup.processes import executable
@@ -61,7 +62,7 @@ def test_nothing_is_lost_while_the_network_is_away_and_nothing_is_told_twice(
         processes.kill('notify')
         mail.start()
         processes.start('damadics_connect', 'notify', [config], 'again')
-        assert wait_for(lambda: len(mails(mail)) >= 3, 30.0), processes.log('again').read_text()
+        assert wait_for(lambda: len(mails(mail)) >= 3), processes.log('again').read_text()
         detectors.silence()
         assert wait_for(lambda: len(mails(mail)) >= 5)
         subjects = [each['subject'].removeprefix('[DAMADICS FD] ') for each in mails(mail)]
@@ -74,9 +75,9 @@ def test_nothing_is_lost_while_the_network_is_away_and_nothing_is_told_twice(
 def test_the_test_command_tells_what_arrives(domain, tmp_path, mail):
     config = configure(tmp_path, mail)
     command = [executable('damadics_connect', 'notify'), config, '--test']
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
     assert (done.returncode, done.stdout) == (0, 'shift: delivered\n'), done.stderr
     mail.kill()
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
     assert done.returncode == 1 and done.stdout.startswith('shift: NOT delivered')
     assert PASSWORD not in done.stdout + done.stderr

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 from asyncua import Client, Server, ua
-from conftest import PATIENCE
+from conftest import PATIENCE, free_port
 from connect.detectors import Detectors
-from connect.servers import free_port, listens, wait_for
+from connect.servers import listens, wait_for
 from damadics_bringup.processes import executable
 from damadics_msgs.msg import FaultEvent
 
@@ -51,7 +51,7 @@ def served(processes, domain, tmp_path):
     with Detectors(domain, 'lv101', 'lv102') as detectors:
         processes.start('damadics_connect', 'opcua', [str(tmp_path / 'out.yaml')])
         log = processes.log('opcua')
-        assert wait_for(lambda: listens(port), 40.0), log.read_text()
+        assert wait_for(lambda: listens(port)), log.read_text()
         yield f'opc.tcp://127.0.0.1:{port}', detectors, log
     assert OPERATOR not in log.read_text() and 'Traceback' not in log.read_text()
 
@@ -158,7 +158,7 @@ def test_a_foreign_stack_reads_and_hears_the_same(served):
     else:
         pytest.fail(reader.stderr.read())
     detectors.judge('lv101', FaultEvent.RAISED, 'friction up')
-    out, problem = reader.communicate(timeout=60)
+    out, problem = reader.communicate(timeout=PATIENCE)
     assert reader.returncode == 0, problem
     told = json.loads(next(line for line in out.splitlines() if line.startswith('{')))
     assert told['browse'] == 'LV101' and told['type'] == 'PADIMType'
@@ -218,7 +218,7 @@ def test_a_nodeset_file_that_cannot_be_taken_in_is_told_in_one_line(domain, tmp_
         [executable('damadics_connect', 'opcua'), str(tmp_path / 'out.yaml')],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=PATIENCE,
     )
     assert done.returncode != 0
     assert 'serve.nodesets: cannot be taken in' in done.stderr

@@ -274,7 +274,7 @@ def start(folder, config: str, *words: str) -> subprocess.CompletedProcess:
         [executable('damadics_connect', 'opcua'), str(path), *words],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=PATIENCE,
     )
 
 
@@ -309,7 +309,7 @@ def test_browse_proposes_a_configuration_that_runs(connect, serve, domain, tmp_p
     server = serve(2, '--at-once', '2')
     program = executable('damadics_connect', 'opcua')
     done = subprocess.run(
-        [program, '--browse', url(server)], capture_output=True, text=True, timeout=60
+        [program, '--browse', url(server)], capture_output=True, text=True, timeout=PATIENCE
     )
     assert done.returncode == 0, done.stderr
     c = connect(yaml.safe_load(done.stdout))
@@ -324,11 +324,11 @@ def test_an_encrypted_channel_and_a_server_that_is_another_one(connect, serve, t
     security = {'certificate': 'own.der', 'key': 'own.pem', 'server_certificate': 'server.der'}
     config = {'server': url(server), 'valves': {'lv0': valve(0)}, 'period': 0.5}
     c = connect({**config, 'security': security})
-    assert c.wait(lambda: len(c.samples['lv0']) > 2, 40.0), c.log()
+    assert c.wait(lambda: len(c.samples['lv0']) > 2), c.log()
     c.processes.end('opcua')
     c = connect({**config, 'security': {**security, 'server_certificate': 'another.der'}})
-    assert c.wait(lambda: 'not connected' in c.log(), 40.0)
+    assert c.wait(lambda: 'not connected' in c.log())
     assert not c.samples['lv0'] and 'Traceback' not in c.log()
     c.processes.end('opcua')
     c = connect({**config, 'security': {**security, 'key': 'server.der'}})
-    assert c.wait(lambda: 'certificate or key cannot be used' in c.log(), 40.0), c.log()
+    assert c.wait(lambda: 'certificate or key cannot be used' in c.log()), c.log()

@@ -9,6 +9,7 @@ import subprocess
 import pytest
 import yaml
 from asyncua import Client
+from conftest import PATIENCE
 from connect.detectors import Detectors
 from connect.servers import Server, wait_for
 from damadics_bringup.processes import executable
@@ -34,7 +35,7 @@ class Plant:
 
     def read(self) -> dict:
         async def values():
-            async with Client(self.url, timeout=20) as client:
+            async with Client(self.url, timeout=PATIENCE) as client:
                 nodes = [client.get_node(f'ns=2;s=FD.{name}') for name in NAMES]
                 nodes.append(client.get_node('ns=2;s=LV0.PV'))
                 return [await node.read_value() for node in nodes]
@@ -42,7 +43,7 @@ class Plant:
         return dict(zip((*NAMES, 'PV'), asyncio.run(values()), strict=True))
 
     def shows(self, **wanted) -> bool:
-        return wait_for(lambda: wanted.items() <= self.read().items(), 40.0, 0.2)
+        return wait_for(lambda: wanted.items() <= self.read().items(), pause=0.2)
 
     def log(self) -> str:
         return self.processes.log('opcua').read_text(errors='replace')
@@ -62,7 +63,7 @@ def test_judgements_stand_in_the_named_nodes_and_nothing_else_is_touched(
             detectors.judge('lv101', FaultEvent.RAISED, cause='friction_up')
             assert plant.shows(HEALTH=OFF_SPEC, FAULT=True, RATIO=2.0, CAUSE='friction_up')
             beat = plant.read()['BEAT']
-            assert wait_for(lambda: plant.read()['BEAT'] != beat, 20.0)
+            assert wait_for(lambda: plant.read()['BEAT'] != beat)
             plant.server.kill()
             plant.server.start()
             assert plant.shows(HEALTH=OFF_SPEC, CAUSE='friction_up'), 'again, without a person'
@@ -121,7 +122,7 @@ def test_mistakes_under_write_are_told_at_once(domain, tmp_path):
           valves: {lv101: {health: ns=2;s=PV, rato: ns=2;s=R, fault: ns=2;s=F, text: ns=2;s=F}}
         """)
     program = executable('damadics_connect', 'opcua')
-    done = subprocess.run([program, str(path)], capture_output=True, text=True, timeout=60)
+    done = subprocess.run([program, str(path)], capture_output=True, text=True, timeout=PATIENCE)
     assert done.returncode == 2
     for words in (
         'write: lv101.health: ns=2;s=PV is read as x1 of lv101',
@@ -130,5 +131,5 @@ def test_mistakes_under_write_are_told_at_once(domain, tmp_path):
     ):
         assert words in done.stderr
     path.write_text('server: opc.tcp://127.0.0.1:1\nwrite: {}\n')
-    done = subprocess.run([program, str(path)], capture_output=True, text=True, timeout=60)
+    done = subprocess.run([program, str(path)], capture_output=True, text=True, timeout=PATIENCE)
     assert done.returncode == 2 and 'write: names no node' in done.stderr

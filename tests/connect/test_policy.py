@@ -5,7 +5,7 @@
 import json
 
 import pytest
-from connect.servers import free_port
+from conftest import free_port
 from damadics_bringup.policy import CONNECTORS, policy
 from damadics_fd.ros import qos
 from damadics_fd.store.fleet_file import Valve

@@ -30,7 +30,7 @@ def stepped(tmp_path, domain):
     subprocess.run(
         ['cc', '-O1', '-shared', '-fPIC', '-o', library, SOURCE, '-ldl', '-pthread'],
         check=True,
-        timeout=60,
+        timeout=PATIENCE,
     )
     file.write_bytes(struct.pack('d', 0.0))
     preload = {'LD_PRELOAD': str(library), 'CLOCK_STEP_FILE': str(file)}

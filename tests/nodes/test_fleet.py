@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import pytest
 import website
 import yaml
-from conftest import Peer, alone, children
+from conftest import Peer, alone, children, free_port
 from damadics_bringup.processes import Processes, surroundings
 from damadics_fd.ros import qos
 from damadics_msgs.msg import FaultFlag
@@ -47,7 +47,7 @@ def fleet(tmp_path_factory):
     folder = tmp_path_factory.mktemp('fleet')
     path = folder / 'fleet.yaml'
     path.write_text(yaml.safe_dump({'valves': {v: entry(n, v) for n, v in enumerate(VALVES, 1)}}))
-    port = website.free_port()
+    port = free_port()
     with pytest.MonkeyPatch.context() as patch:
         domain = alone(patch, folder)
         peer = Peer(domain, publishes=False)
@@ -106,7 +106,7 @@ def test_every_valve_has_its_own_state(fleet):
     monitored(fleet)
     call(fleet, InjectFault, f'/{FAULTY}/inject_fault', fault=SPRING, strength=1.0)
     call(fleet, Shelve, f'/{SHELVED}/shelve', duration=600.0, user='Anna')
-    assert fleet.peer.wait(lambda: fleet.flags[FAULTY][-1].fault, 60.0)
+    assert fleet.peer.wait(lambda: fleet.flags[FAULTY][-1].fault)
     fleet.tiles[FAULTY].wait(website.ALARM)
     fleet.tiles[SHELVED].wait(('C',))
     fleet.peer.wait(lambda: False, 15.0 if website.PICTURES else 3.0)

@@ -27,7 +27,7 @@ def test_joined_nodes_are_two_nodes_to_everybody_else(processes, peer):
     )
     valve = Valve(peer)
     graph = peer.node
-    assert peer.wait(lambda: valve.flags and graph.count_subscribers('/measurement') == 1, 60.0)
+    assert peer.wait(lambda: valve.flags and graph.count_subscribers('/measurement') == 1)
     assert peer.wait(lambda: peer.publisher.get_subscription_count() == 1)
 
     # with nobody else listening, it judges and raises alarms

@@ -9,8 +9,7 @@ import time
 
 import numpy as np
 import pytest
-import website
-from conftest import PATIENCE, promised
+from conftest import PATIENCE, free_port, promised
 from damadics_bringup.processes import (
     executable,
     parameters,
@@ -188,7 +187,7 @@ def test_a_node_alone_says_what_it_waits_for(processes, name):
 def test_signals_end_a_node_with_exit_code_0(domain, tmp_path, name, numbers):
     arguments = {
         'recorder': ['--all', '--out', str(tmp_path / 'bag')],
-        'dashboard': ['--port', str(website.free_port()), '--state', str(tmp_path)],
+        'dashboard': ['--port', str(free_port()), '--state', str(tmp_path)],
     }.get(name, [])
     package = {'plant': 'damadics_plant', 'dashboard': 'damadics_dashboard'}.get(
         name, 'damadics_fd'
@@ -205,7 +204,7 @@ def test_signals_end_a_node_with_exit_code_0(domain, tmp_path, name, numbers):
             process.send_signal(number)
             time.sleep(0.005)
         began = time.monotonic()
-        assert process.wait(10.0) == 0
+        assert process.wait(PATIENCE) == 0
         assert time.monotonic() - began < promised(4.0 if name == 'dashboard' else 2.0)
     finally:
         process.kill()
@@ -215,7 +214,7 @@ def test_signals_end_a_node_with_exit_code_0(domain, tmp_path, name, numbers):
 def test_all_mistakes_in_the_parameters_are_listed(domain, name):
     wrong = parameters(mode='paper', k1=-1.0, tau=0, no_such='x', decide_m='two')
     done = subprocess.run(
-        [executable('damadics_fd', name), *wrong], capture_output=True, text=True, timeout=30
+        [executable('damadics_fd', name), *wrong], capture_output=True, text=True, timeout=PATIENCE
     )
     assert done.returncode == 2
     for cause in (
@@ -243,7 +242,7 @@ def test_what_ros_itself_refuses_is_one_line_and_no_restart(domain, name, words,
         [executable(package, name), '--ros-args', *words],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=PATIENCE,
     )
     assert done.returncode == 2, done.stderr
     assert says in done.stderr
@@ -286,5 +285,5 @@ def run_plant(file, *more):
         [executable('damadics_plant', 'plant'), '--ros-args', '--params-file', str(file), *given],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=PATIENCE,
     )

@@ -8,7 +8,7 @@ from functools import partial
 from types import SimpleNamespace
 
 import pytest
-from conftest import Peer, alone, promised
+from conftest import PATIENCE, Peer, alone, promised
 from damadics_bringup.launcher import arguments_of
 from damadics_bringup.policy import policy
 from damadics_bringup.processes import Processes, executable, parameters, surroundings
@@ -178,7 +178,7 @@ def test_a_second_detector_of_the_same_valve_gives_way(valve, plant):
         [executable('damadics_fd', 'detector'), *parameters(**SETTINGS)],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=PATIENCE,
     )
     assert second.returncode == 1
     assert 'another detector sends on /fault_flag' in second.stderr

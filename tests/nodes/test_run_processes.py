@@ -57,7 +57,7 @@ def test_children_end_with_what_started_them(tmp_path, number):
     assert len(started) == 3
     assert all(map(alive, started))
     parent.send_signal(number)
-    parent.wait(10.0)
+    parent.wait(PATIENCE)
     assert wait_for(lambda: not any(map(alive, started))), 'they run on'
 
 
@@ -106,7 +106,7 @@ def test_what_can_never_start_is_refused_before_anything_is_started(tmp_path, wo
         ],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=PATIENCE,
     )
     assert done.returncode == 2
     assert says in done.stderr
@@ -128,7 +128,7 @@ def test_a_port_in_use_is_told(tmp_path):
             ],
             capture_output=True,
             text=True,
-            timeout=60,
+            timeout=PATIENCE,
         )
     assert done.returncode == 2
     assert 'Address already in use' in done.stderr
@@ -141,7 +141,7 @@ def test_wrong_parameters_of_a_valve_are_told_once_and_end_the_run(domain, tmp_p
         [executable('damadics_bringup', 'run'), str(fleet), '--logs', str(tmp_path / 'logs')],
         capture_output=True,
         text=True,
-        timeout=90,
+        timeout=PATIENCE,
     )
     assert done.returncode == 2
     assert done.stderr.count('cannot run as it is') == 2
@@ -176,7 +176,7 @@ def test_another_middleware_gets_a_sentence_with_the_remedy(domain):
         [executable('damadics_fd', 'detector')],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=PATIENCE,
         env={**os.environ, 'RMW_IMPLEMENTATION': 'rmw_zenoh_cpp'},
     )
     assert done.returncode == 2
@@ -191,7 +191,7 @@ def test_an_interrupt_while_it_imports_leaves_no_traceback(domain):
     maps = Path(f'/proc/{process.pid}/maps')
     assert wait_for(lambda: 'numpy' in maps.read_text())
     process.send_signal(signal.SIGINT)
-    _, said = process.communicate(timeout=30)
+    _, said = process.communicate(timeout=PATIENCE)
     assert 'Traceback' not in said
 
 
@@ -217,7 +217,7 @@ def test_a_user_who_can_write_nowhere_starts_a_node(domain, home):
         ],
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=PATIENCE,
         env=environment,
     )
     assert done.returncode == 0, done.stderr

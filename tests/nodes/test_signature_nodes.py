@@ -84,7 +84,7 @@ def test_a_fault_of_the_running_plant_gets_its_cause_and_replay_says_the_same(ch
         ),
     )
     signatures = chain.got['signature']
-    assert chain.wait(lambda: signatures and stamp_of(signatures[-1]) > 118e9, 100.0)
+    assert chain.wait(lambda: signatures and stamp_of(signatures[-1]) > 118e9)
     last = signatures[-1]
     assert last.state == Signature.STATE_ALARM
     assert last.source == Signature.SOURCE_APPROXIMATOR

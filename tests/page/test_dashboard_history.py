@@ -150,8 +150,10 @@ def test_damaged_rows_of_a_history_are_left_out_and_told(tmp_path):
     with sqlite3.connect(path) as file:
         file.execute("UPDATE event SET valve = CAST(x'50ff45' AS TEXT) WHERE text = 'text'")
         file.execute("UPDATE event SET stamp = 'yesterday' WHERE text = 'stamp'")
+        file.execute("INSERT INTO event (valve, seen) VALUES (x'ff', 1.0), (NULL, 2.0)")
     history = History(path)
     assert [row['text'] for row in history.latest()] == ['text', 'whole']
+    assert all(isinstance(valve, str) for valve in history.valves())
     assert 'P\ufffdE' in history.valves()
     assert 'left out' in history.problem
     history.close()

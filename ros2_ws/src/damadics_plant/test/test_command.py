@@ -36,7 +36,7 @@ def start(*arguments):
     )
 
 
-def wait_for(condition, what, seconds=60):
+def wait_for(condition, what, seconds=120):
     end = time.monotonic() + seconds
     while not condition():
         assert time.monotonic() < end, f'no {what} within {seconds} s'
@@ -193,7 +193,7 @@ def test_interrupt_leaves_valid_files(tmp_path, names):
             lambda: any(path.stat().st_size > 10**6 for path in tmp_path.rglob('*.csv')), 'output'
         )
         process.send_signal(signal.SIGINT)
-        _, error = process.communicate(timeout=30)
+        _, error = process.communicate(timeout=120)
     finally:
         process.kill()
     assert process.returncode == 130

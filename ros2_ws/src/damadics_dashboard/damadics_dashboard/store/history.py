@@ -202,7 +202,7 @@ class History:
         """
         with self._lock:
             rows = self._db.execute('SELECT DISTINCT valve FROM event').fetchall()
-        return sorted(row[0] for row in rows)
+        return sorted(name for (name,) in rows if isinstance(name, str))
 
     def tags(self) -> dict[str, str]:
         """
@@ -280,7 +280,8 @@ class History:
 
 def _fits(row: Sequence[str | float | bytes | None], kinds: Sequence[str]) -> bool:
     """Tell whether values from the file are of the kinds of their columns; SQLite checks none."""
-    return all(
+    valve, *_ = row
+    return valve is not None and all(
         value is None or isinstance(value, KINDS[kind])
         for value, kind in zip(row, kinds, strict=True)
     )

@@ -3,6 +3,7 @@
 """What the commands of all packages share: where they keep things, how they explain themselves."""
 
 import argparse
+import io
 import os
 import sys
 from collections.abc import Iterable, Sequence
@@ -44,6 +45,9 @@ def command_parser(name: str, description: str, examples: str) -> argparse.Argum
     :param examples: shown below the options, line by line as written.
     :return: a parser without arguments.
     """
+    for stream in (sys.stdout, sys.stderr):  # a terminal may not have the letters of a file's name
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors='backslashreplace')
     return argparse.ArgumentParser(
         prog=name,
         description=description,

@@ -7,7 +7,6 @@ In two slots, see `slots`. It is refused with the reason where it is damaged, of
 or of other settings.
 """
 
-import math
 import time
 from dataclasses import asdict, dataclass, field, fields
 from functools import cache, lru_cache
@@ -27,6 +26,7 @@ except PackageNotFoundError:  # run from a source tree that was never built
 FORMAT = 'damadics_fd reference 1'
 LATEST = 2**31 * 10**9  # ns; what fits into the stamp of a message
 LONGEST = 1000  # characters of a path that is asked for
+LATEST_CREATED = 1e12  # s since 1970
 CLOCK_TOLERANCE = 86400.0  # s; a file from later than that is from a wrong clock
 # settings that the learned numbers depend on; the others may change after learning
 BINDING = (
@@ -158,7 +158,7 @@ def _reference(content: Saved) -> Reference:
         actuator, source, software, comment = (
             _text(content, name) for name in ('actuator', 'source', 'software', 'comment')
         )
-        created = number_of(content, 'created', 0.0, math.inf)
+        created = number_of(content, 'created', 0.0, LATEST_CREATED)
         first, last = (
             int(number_of(content, name, -LATEST, LATEST))
             for name in ('first_stamp', 'last_stamp')
@@ -210,7 +210,7 @@ def _defaults(mode: str) -> Saved:
 def _check(reference: Reference, actuator: str | None, settings: Settings, now: float) -> None:
     if actuator is not None and reference.actuator != actuator:
         raise ValueError(f'belongs to {reference.actuator}, not to {actuator}')
-    if reference.created > now + CLOCK_TOLERANCE or not math.isfinite(reference.created):
+    if reference.created > now + CLOCK_TOLERANCE:
         raise ValueError(
             f'was written {(reference.created - now) / 86400:.1f} days in the '
             'future: set the clock right'

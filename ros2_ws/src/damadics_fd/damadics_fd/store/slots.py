@@ -7,10 +7,12 @@ The one way files are written that have to survive: JSON in two slots, with a ha
 that a power cut leaves the other; what does not fit its hash is not read. Nothing is unpickled.
 """
 
+import contextlib
+import errno
 import hashlib
 import json
-import math
 import os
+import reprlib
 import stat
 import time
 from dataclasses import dataclass
@@ -20,6 +22,7 @@ from damadics_fd.core.record import Plain, Saved
 
 NAMES = ('a', 'b')
 LARGEST = 16_000_000  # bytes; a larger file is none of ours
+MOST_SAVES = 2**62  # what is above was never counted to
 KEPT_ASIDE = 20  # of one name; older ones go
 
 
@@ -121,21 +124,21 @@ def set_aside(file: Path, keep: bool = False) -> Path:
     Keep what cannot be read under another name, for a person to look at.
 
     :param file: what is damaged: file, link, folder.
-    :param keep: a file also stays where it is until the next save replaces it: a crash in between
-        must not make it look as if there had never been one. What is no file gives way at once.
+    :param keep: it also stays where it is until the next save replaces it: a crash in between, or
+        a full disk, must not make it look as if there had never been anything.
     :return: its new path, beside the old one.
     :raises OSError: where the folder cannot be written.
     """
     stem = f'{file.name}.bad-'
     target = file.with_name(f'{stem}{time.time_ns()}')
-    if keep and stat.S_ISREG(file.lstat().st_mode):
-        try:
-            os.link(file, target)
-        except OSError:  # a file system without links
-            file.rename(target)
-    else:
+    if not (keep and _linked(file, target)):
         file.rename(target)
-    older = sorted(p for p in file.parent.iterdir() if p.name.startswith(stem) and p.is_file())
+        if keep:
+            with contextlib.suppress(OSError):
+                file.symlink_to(target.name)
+    older = sorted(
+        p for p in file.parent.iterdir() if p.name.startswith(stem) and not _is_folder(p)
+    )
     for path in older[:-KEPT_ASIDE]:
         path.unlink(missing_ok=True)
     return target
@@ -146,16 +149,20 @@ def check_folder(folder: Path) -> str:
     Try whether files can be kept in a folder; it is made where it is missing.
 
     :param folder: path.
-    :return: '' if so, otherwise one sentence.
+    :return: '' if so, otherwise one sentence. A full disk is no reason: there will be room again,
+        and until then whoever keeps something there tells that he cannot.
     """
     trial = folder / f'.{os.getpid()}.tmp'
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with trial.open('w', encoding='utf-8') as stream:
-            stream.write('x')
-        trial.unlink()
+        try:
+            with trial.open('w', encoding='utf-8') as stream:
+                stream.write('x')
+        finally:
+            trial.unlink(missing_ok=True)
     except OSError as problem:
-        return f'cannot write into {folder}: {problem.strerror}'
+        if problem.errno not in (errno.ENOSPC, errno.EDQUOT):
+            return f'cannot write into {folder}: {problem.strerror}'
     return ''
 
 
@@ -196,6 +203,19 @@ def parse(data: bytes) -> Saved:
     return document
 
 
+def _linked(file: Path, name: Path) -> bool:
+    """Give what is no folder a second name; a file system may have none."""
+    try:
+        os.link(file, name, follow_symlinks=False)
+    except OSError:
+        return False
+    return True
+
+
+def _is_folder(path: Path) -> bool:
+    return path.is_dir() and not path.is_symlink()
+
+
 def _refuse(name: str) -> Plain:
     raise ValueError(f'the number {name} is not finite')
 
@@ -209,8 +229,10 @@ def _slot(file: Path, kind: str) -> Slot | None:
         if document.get('sha256') != _digest(body):
             raise ValueError('damaged: its sha256 does not fit its content')
         number, content = document.get('number'), document.get('content')
-        if not isinstance(number, int) or number < 0 or not isinstance(content, dict):
-            raise ValueError('damaged: number or content are missing')
+        if not isinstance(number, int) or not 0 <= number <= MOST_SAVES:
+            raise ValueError('damaged: its number is missing')
+        if not isinstance(content, dict):
+            raise ValueError('damaged: its content is missing')
     except FileNotFoundError:
         return _dangling(file) if file.is_symlink() else None
     except OSError as problem:
@@ -244,8 +266,10 @@ def number_of(content: Saved, name: str, low: float, high: float) -> float:
     :raises ValueError: where it is missing, no number or out of its range.
     """
     value = content.get(name)
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, int | float):
         raise ValueError(f'damaged: {name} is no number')
-    if not low <= value <= high:
-        raise ValueError(f'damaged: {name} = {value:g} is not within {low:g} .. {high:g}')
+    if not low <= value <= high:  # whole numbers may be larger than any float; NaN is never within
+        raise ValueError(
+            f'damaged: {name} = {reprlib.repr(value)} is not within {low:g} .. {high:g}'
+        )
     return value

@@ -4,6 +4,9 @@
 
 import csv
 import json
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -36,6 +39,27 @@ def test_the_result_is_a_list_of_bags_with_detections(tmp_path, capsys):
     assert any(20.0 <= d['t'] < 20.01 for d in result['detections'])
     assert (tmp_path / 'figures' / 'a.png').stat().st_size > 50_000
     assert '12,000' in capsys.readouterr().out
+
+
+def test_a_clock_that_was_set_back_shortens_no_recording(tmp_path, capsys):
+    columns = stroke()
+    columns['stamp'][6000:] -= 3600 * 10**9
+    columns['stamp'] += 2 * 3600 * 10**9
+    as_csv(columns, tmp_path / 'a.csv')
+    (result,) = replayed(tmp_path / 'a.csv')
+    assert result['duration_s'] == pytest.approx(29.995)
+
+
+def test_a_terminal_without_the_letters_of_a_name_shows_them_otherwise(tmp_path):
+    as_csv(stroke(), tmp_path / 'Ventil_Ö.csv')
+    done = subprocess.run(
+        [sys.executable, '-m', 'damadics_fd.commands.replay.replay', tmp_path / 'Ventil_Ö.csv'],
+        env={**os.environ, 'PYTHONPATH': os.pathsep.join(sys.path), 'PYTHONIOENCODING': 'ascii'},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    assert r'Ventil_\xd6.csv' in done.stdout
 
 
 @needs_messages

@@ -43,6 +43,8 @@ def test_a_kill_while_writing_loses_the_last_act_at_most(tmp_path):
         {'action': 256},
         {'action': '0'},
         {'more': 1},
+        {'stamp': 10**400},  # whole, and larger than any float
+        {'occurrence': 1.5e300},
     ],
 )
 def test_values_of_a_file_are_checked_as_those_of_a_request(tmp_path, change):

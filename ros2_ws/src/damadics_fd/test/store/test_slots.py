@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """PR-2: a file that has to survive is read whole and unchanged, or not at all."""
 
+import errno
+import hashlib
 import json
 import os
 
@@ -20,6 +22,13 @@ def contents(path):
 
 def problems(path):
     return [slot.problem for slot in read_slots(path, KIND) if slot.problem]
+
+
+def signed(**changes):
+    """Return a file with the hash that belongs to its content."""
+    body = {'format': KIND, 'number': 1, 'content': CONTENT, **changes}
+    text = json.dumps(body, sort_keys=True, separators=(',', ':'))
+    return json.dumps({**body, 'sha256': hashlib.sha256(text.encode()).hexdigest()})
 
 
 def test_both_slots_hold_the_newest_where_it_matters(tmp_path):
@@ -62,6 +71,9 @@ def test_any_damage_is_noticed(tmp_path_factory, data):
         '\x00' * 300,
         json.dumps({'format': KIND, 'number': -5, 'content': {}}),
         json.dumps({'format': KIND, 'number': 10**400, 'content': []}),
+        signed(number=9 * 10**4299),  # one more would have too many digits to be written
+        signed(number=2**63),
+        signed(number=True, content=[]),
     ],
     ids=lambda text: text[:12],
 )
@@ -69,10 +81,13 @@ def test_hostile_text_is_damage(tmp_path, text):
     (tmp_path / 'v.a.json').write_text(text)
     assert contents(tmp_path / 'v') == []
     assert len(problems(tmp_path / 'v')) == 1
+    write_slot(tmp_path / 'v', KIND, CONTENT, both=True)
+    assert contents(tmp_path / 'v') == [CONTENT] * 2
 
 
+@pytest.mark.parametrize('keep', [False, True])
 @pytest.mark.parametrize('kind', ['folder', 'loop', 'null', 'zero', 'pipe', 'nothing', 'huge'])
-def test_what_is_no_file_is_damage_and_is_replaced(tmp_path, kind):
+def test_what_is_no_file_is_damage_and_is_replaced(tmp_path, kind, keep):
     file = tmp_path / 'v.a.json'
     make = {
         'folder': file.mkdir,
@@ -85,9 +100,9 @@ def test_what_is_no_file_is_damage_and_is_replaced(tmp_path, kind):
     }
     make[kind]()
     assert len(problems(tmp_path / 'v')) == 1
-    aside = set_aside(file)
+    aside = set_aside(file, keep)
     assert os.path.lexists(aside)
-    assert read_slots(tmp_path / 'v', KIND) == []
+    assert len(read_slots(tmp_path / 'v', KIND)) == keep, 'what is kept is damaged until replaced'
     write_slot(tmp_path / 'v', KIND, CONTENT, both=True)
     assert contents(tmp_path / 'v') == [CONTENT] * 2
 
@@ -97,6 +112,17 @@ def test_what_is_kept_aside_does_not_fill_the_disk(tmp_path):
         (tmp_path / 'v.a.json').write_text('x')
         set_aside(tmp_path / 'v.a.json')
     assert len(list(tmp_path.iterdir())) == 20
+
+
+@pytest.mark.parametrize('number', [errno.ENOSPC, errno.EDQUOT])
+def test_a_full_disk_is_no_reason_not_to_start(tmp_path, monkeypatch, number):
+    def full(*_, **__):
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr(type(tmp_path), 'open', lambda self, *_, **__: (self.touch(), full()))
+    assert check_folder(tmp_path) == ''
+    monkeypatch.undo()
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_folder_that_cannot_be_written_is_told(tmp_path):

@@ -175,6 +175,7 @@ class Player:
         )
         self._lacking = set(NEEDED[plan.mode])
         self._zero = self._first = self._last = -1
+        self._span = 0  # ns
 
     def take(self, columns: Columns) -> None:
         """
@@ -189,6 +190,8 @@ class Player:
             raise BagError('has stamps that have rolled over: see verify', self._recording.name)
         if self._first < 0:
             self._zero, self._first = origin(int(stamp[0])), int(stamp[0])
+        steps = np.diff(stamp, prepend=stamp[0] if self._last < 0 else self._last)
+        self._span += int(steps[steps > 0].sum())  # a clock that was set back took no time away
         self._last = int(stamp[-1])
         result = self._monitor.run(columns) if self._flags or self._thinner else None
         events = result.events if result else self._monitor.events(columns)
@@ -213,7 +216,7 @@ class Player:
         :raises BagError: where there is no result.
         """
         outcome, plan, recording = self._outcome, self._plan, self._recording
-        outcome.duration_s = (self._last - self._first) / SECOND
+        outcome.duration_s = self._span / SECOND
         outcome.samples_per_s = outcome.samples / outcome.spent
         outcome.lossy = bool(outcome.problems) and not recording.table
         outcome.refused, outcome.status = self._monitor.refused, self._monitor.status

@@ -8,6 +8,8 @@ from typing import TypeVar
 from lifecycle_msgs.srv import ChangeState
 from rclpy.node import Node
 
+from damadics_fd.core.text import NAME, SENTENCE, plain
+
 Request = TypeVar('Request')
 Response = TypeVar('Response')
 
@@ -29,13 +31,16 @@ def _contained(
     node: Node, name: str, serve: Callable[[Request, Response], Response]
 ) -> Callable[[Request, Response], Response]:
     def served(request: Request, response: Response) -> Response:
+        wanted = ''
+        if isinstance(request, ChangeState.Request):
+            transition = request.transition
+            transition.label = plain(transition.label, NAME)  # rcl logs it as it is
+            wanted = f' transition {transition.id} {transition.label}'
         try:
             return serve(request, response)
         except Exception as error:
-            wanted = ''
-            if isinstance(request, ChangeState.Request):
-                wanted = f' transition {request.transition.id} {request.transition.label}'
-            node.get_logger().warning(f'{name}: refused{wanted}: {error}'[:300])
+            text = plain(str(error), SENTENCE)
+            node.get_logger().warning(f'{name}: refused{wanted}: {text}'[:300])
             return response
 
     return served

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 import rclpy
+from conftest import PATIENCE
 from damadics_fd.nodes import input_watch
 from damadics_fd.ros.diagnostics import Diagnostics, Level
 from damadics_fd.ros.entities import Entities
@@ -27,16 +28,15 @@ PROFILE = QoSProfile(depth=100)
 
 
 @pytest.fixture
-def node(monkeypatch):
-    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+def node(domain):
     context = Context()
-    rclpy.init(context=context, domain_id=94)
+    rclpy.init(context=context, domain_id=domain)
     node = LifecycleNode('contained', context=context)
     own_services.contain(node)
     executor = EventsExecutor(context=context)
     executor.add_node(node)
 
-    def wait(condition, patience=60.0):
+    def wait(condition, patience=PATIENCE):
         deadline = time.monotonic() + patience
         while not condition() and time.monotonic() < deadline:
             executor.spin_once(timeout_sec=0.05)

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The recorder as a process over DDS: nothing lost, closed properly, safe against a kill."""
 
-import os
-import random
 import re
 import signal
 import subprocess
@@ -12,35 +10,29 @@ import time
 
 import numpy as np
 import pytest
+import rclpy
+from conftest import PATIENCE
 from damadics_fd.bag import read_columns
 from damadics_fd.bag.checking.inspection import LOSSY, WHOLE, inspect
-
-from .bag_support import needs_messages
-
-rclpy = pytest.importorskip('rclpy')
-pytest.importorskip('damadics_msgs.msg')
-from damadics_fd.ros.loss_count import Sequence  # noqa: E402
-from damadics_msgs.msg import (  # noqa: E402
+from damadics_fd.ros.loss_count import Sequence
+from damadics_msgs.msg import (
     FaultFlag,
     FleetLayout,
     Float64Stamped,
     Measurement,
     MeasurementBlock,
 )
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus  # noqa: E402
-from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.qos import DurabilityPolicy, QoSProfile
 
-pytestmark = [pytest.mark.ros, needs_messages]
+pytestmark = pytest.mark.ros
 RATE = 1000  # messages per second and topic
 
 
 class Graph:
     """A node that publishes, and recorders as processes, in a domain of their own."""
 
-    def __init__(self) -> None:
-        domain = random.randrange(1, 100)
-        os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-        self.environment = os.environ | {'ROS_DOMAIN_ID': str(domain)}
+    def __init__(self, domain: int) -> None:
         self.context = rclpy.context.Context()
         rclpy.init(context=self.context, domain_id=domain)
         self.node = rclpy.create_node('source', context=self.context)
@@ -55,14 +47,10 @@ class Graph:
     def record(self, *args: object) -> subprocess.Popen:
         command = [sys.executable, '-m', 'damadics_fd.commands.record', *map(str, args)]
         process = subprocess.Popen(
-            command,
-            env=self.environment,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
+            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
         )
         self.processes.append(process)
-        deadline = time.monotonic() + 30
+        deadline = time.monotonic() + PATIENCE
         wanted = [self.measurement, self.residual]
         while any(p.get_subscription_count() == 0 for p in wanted):
             assert process.poll() is None, process.stderr.read()
@@ -99,8 +87,8 @@ class Graph:
 
 
 @pytest.fixture
-def graph():
-    graph = Graph()
+def graph(domain):
+    graph = Graph(domain)
     yield graph
     graph.close()
 
@@ -111,7 +99,7 @@ def test_every_message_is_in_the_bag_when_a_signal_ends_it(graph, tmp_path, numb
     process = graph.record('--all', '--out', tmp_path / 'bag')
     graph.publish(2000)
     process.send_signal(number)
-    out, error = process.communicate(timeout=20)
+    out, error = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0, error
     assert out.startswith('recording /')
     assert ' messages, ' in out.splitlines()[-1]
@@ -136,7 +124,7 @@ def test_blocks_are_recorded_with_the_list_of_their_valves(graph, tmp_path):
     layouts.publish(FleetLayout(version=3, valve=names, actuator=names, area=['', '']))
     topics = ['measurement', 'residual', 'measurement_block']  # and not fleet/layout
     process = graph.record(*topics, '--out', tmp_path / 'bag')
-    deadline = time.monotonic() + 30
+    deadline = time.monotonic() + PATIENCE
     while not (blocks.get_subscription_count() and layouts.get_subscription_count()):
         assert time.monotonic() < deadline, 'the recorder does not subscribe'
         time.sleep(0.02)
@@ -146,7 +134,7 @@ def test_blocks_are_recorded_with_the_list_of_their_valves(graph, tmp_path):
         blocks.publish(message)
     assert blocks.wait_for_all_acked()
     process.send_signal(signal.SIGINT)
-    out, error = process.communicate(timeout=20)
+    out, error = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0, error
     assert inspect(tmp_path / 'bag').code == WHOLE
     found = read_columns(tmp_path / 'bag', '/measurement_block', valve='/lv2')
@@ -159,7 +147,7 @@ def test_messages_lost_on_the_way_are_counted(graph, tmp_path):
     shallow = graph.node.create_publisher(Float64Stamped, 'shallow', QoSProfile(depth=5))
     told = []
     graph.node.create_subscription(DiagnosticArray, '/diagnostics', told.append, 10)
-    deadline = time.monotonic() + 30
+    deadline = time.monotonic() + PATIENCE
     while shallow.get_subscription_count() == 0:
         assert time.monotonic() < deadline, 'the recorder does not subscribe'
         time.sleep(0.02)
@@ -176,7 +164,7 @@ def test_messages_lost_on_the_way_are_counted(graph, tmp_path):
     for _ in range(100):
         time.sleep(0.01)
         shallow.publish(message)
-    deadline = time.monotonic() + 20
+    deadline = time.monotonic() + PATIENCE
     executor = rclpy.executors.SingleThreadedExecutor(context=graph.context)
     executor.add_node(graph.node)
 
@@ -187,7 +175,7 @@ def test_messages_lost_on_the_way_are_counted(graph, tmp_path):
     while lost_so_far() < 1000 and time.monotonic() < deadline:
         executor.spin_once(timeout_sec=0.2)
     process.terminate()
-    out, error = process.communicate(timeout=20)
+    out, error = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0, error
     recorded = len(read_columns(tmp_path / 'bag', '/shallow')['data'])
     lost = int(re.search(r'(\d+) lost on the way', out)[1])
@@ -242,7 +230,7 @@ def test_named_topics_are_recorded_alone_and_split(graph, tmp_path):
     graph.raise_flag(True)
     graph.publish(2500)
     process.terminate()
-    assert process.wait(timeout=20) == 0
+    assert process.wait(timeout=PATIENCE) == 0
     assert len(list((tmp_path / 'bag').glob('*.mcap'))) >= 3
     report = inspect(tmp_path / 'bag')
     assert report.code == WHOLE
@@ -259,7 +247,7 @@ def test_the_black_box_holds_what_was_before_and_after_a_fault(graph, tmp_path):
     graph.raise_flag(True)
     graph.publish(1500)
     process.terminate()
-    assert process.wait(timeout=20) == 0
+    assert process.wait(timeout=PATIENCE) == 0
     (bag,) = (tmp_path / 'box').iterdir()
     assert inspect(bag).code == WHOLE
     assert read_columns(bag, '/fault_flag')['fault'].tolist()[-1] == 1
@@ -278,7 +266,7 @@ def test_errors_before_the_start_are_one_line(tmp_path):
         [sys.executable, '-m', 'damadics_fd.commands.record', '--out', str(tmp_path / 'bag')],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=PATIENCE,
     )
     assert result.returncode == 1
     assert result.stderr.strip().endswith('give the bag another name')
