@@ -25,6 +25,18 @@ EVIL = (
     '<img src=x onerror=window.pwn=3><script>window.pwn=4</script>`${window.pwn=5}`{{7*7}}'
     "');window.pwn=6;//\x1b[31m"
 )
+NO_ALARM = (
+    FaultFlag.STATE_NOT_MONITORING,
+    FaultFlag.STATE_LEARNING,
+    FaultFlag.STATE_HEALTHY,
+)
+STATES = (
+    *NO_ALARM,
+    FaultFlag.STATE_ALARM,
+    FaultFlag.STATE_LATCHED,
+    FaultFlag.STATE_SHELVED,
+    FaultFlag.STATE_UNKNOWN,
+)
 PAGES = ('/', '/valve/~root', '/valve/hostile/v1', '/history', '/replay', '/valve/none%22%3Ex')
 
 
@@ -284,9 +296,15 @@ def test_partial_strokes_are_asked_for_where_the_detector_allows_them(site, brow
 
 @pytest.mark.parametrize('scheme', ['light', 'dark'])
 def test_axe_finds_nothing_serious_on_any_page(site, hostile, browser, scheme):
+    for state in STATES:
+        for level in (0,) if state in NO_ALARM else (1, 2, 3, 4):
+            valve, fault = f'every/v{state}{level}', state not in NO_ALARM
+            site.voices.flag(valve, state, level=level, fault=fault, occurrence=int(fault))
     page = website.new_page(browser, color_scheme=scheme)
     for address in ('/', '/valve/hostile/v1', '/history', '/replay', '/valve/none'):
         page.goto(site.address + address)
+        if address == '/':
+            page.wait_for_selector('.tile.S .state b')
         page.wait_for_timeout(2000)
         assert page_site.serious(page) == [], address
         page.set_viewport_size({'width': 390, 'height': 844})

@@ -13,8 +13,9 @@ from damadics_dashboard.live.record import ACTIONS
 from damadics_dashboard.live.traces import NANO, Trace, envelope
 from damadics_dashboard.live.valve import Valve
 from damadics_dashboard.pages.fleet_page import tile
-from damadics_dashboard.pages.playback import settings_in_file
+from damadics_dashboard.pages.playback import play, settings_in_file
 from damadics_dashboard.store.export import cell
+from damadics_dashboard.words.answers import answer_words
 from damadics_dashboard.words.templates import TEMPLATES, render
 from damadics_dashboard.words.texts import texts
 from damadics_dashboard.words.valve_words import alarm_words, history_rows
@@ -298,3 +299,17 @@ def test_durations_and_times_have_one_form():
         '3 days',
     ]  # fmt: skip
     assert re.fullmatch(r'2023-11-1\d \d\d:\d\d:\d\d UTC([+-]\d\d:\d\d)?', t.moment(17 * 10**17))
+
+
+@pytest.mark.parametrize(
+    ('scale', 'said'),
+    [(1.0, 'lernt, '), (100.0, 'der Eingang ist ausgefallen: x1 = ')],
+    ids=['too short', 'percent for fractions'],
+)
+def test_a_recording_that_is_not_judged_says_why(tmp_path, scale, said):
+    lines = [f'{k / 100:.2f},0.5,{0.5 * scale},3e6,2e6,1e5' for k in range(1000)]
+    path = tmp_path / 'a.csv'
+    path.write_text('\n'.join(['t,cv,x1,p1,p2,ps', *lines, '']))
+    (done,) = play(path, 'monitor')
+    assert not done.monitored
+    assert answer_words(done.status, 'de').startswith(said), done.status

@@ -13,6 +13,7 @@ from damadics_dashboard.live.overview import Overview
 from damadics_dashboard.live.valve import Valve
 from damadics_dashboard.pages.fleet_page import Tiles
 from damadics_dashboard.words.texts import texts
+from damadics_dashboard.words.valve_words import alarm_words
 from damadics_msgs.msg import FaultFlag, OperatorAction
 
 
@@ -62,6 +63,28 @@ def test_of_a_large_fleet_only_tiles_with_other_words_travel(fleet_of_200):
     now = 21.0
     overview.look(now)
     assert tiles.news() == {'tiles': {}}, 'silence goes on'
+
+
+def test_an_alarm_from_before_the_process_was_restarted_is_listed(fleet_of_200):
+    valves, status, tell = fleet_of_200
+    status.state[7], status.level[7], status.fault[7] = FaultFlag.STATE_ALARM, 4, True
+    status.cause[7], status.residual[7], status.since[7] = (
+        'friction_up',
+        1.4,
+        1_699_999_990 * 10**9,
+    )
+    tell(10.0)
+    overview = Overview(valves, lambda: 1_700_000_010 * 10**9)
+    overview.look(10.0)
+    (alarm,) = overview.alarms.values()
+    assert (alarm.occurrence, alarm.level, alarm.state) == (0, 4, 'active'), '0: the present one'
+    words = alarm_words(valves['unit7/v0007'], alarm, texts('en'), name=False)
+    assert 'riction' in words.headline and words.since
+    assert 'Alarm no.' not in dict(words.cells) and dict(words.cells)['Largest residual']
+    status.state[7], status.level[7], status.fault[7] = FaultFlag.STATE_HEALTHY, 0, False
+    tell(11.0)
+    overview.look(11.0)
+    assert not overview.alarms
 
 
 def test_the_learning_of_a_large_fleet_is_told_in_steps(fleet_of_200):

@@ -146,15 +146,16 @@ class FleetReport:
             np.maximum(np.asarray(message.since), 0).tolist(),
             message.ratio.tolist(),
             message.progress.tolist(),
+            message.cause,
         )
         count = len(valves)
-        for n, state, level, fault, residual, limit, stamp, since, ratio, progress in zip(
+        for n, state, level, fault, residual, limit, stamp, since, ratio, progress, cause in zip(
             *columns, strict=False
         ):
             if n >= count:
                 continue
             valve = valves[n]
-            valve.learned = progress
+            valve.learned, valve.suspected = progress, cause
             valve.take(
                 Judged(state, level, fault, residual, limit, stamp, since, valve.occurrence), now
             )

@@ -97,6 +97,7 @@ class Valve:
         self.fleet: Membership | None = None
         self.stroking = False  # a fleet says that it makes partial strokes
         self.learned = math.nan  # share of the learning that a fleet reports
+        self.suspected = ''  # cause that a fleet reports
         self.period = 0.0
         self.diagnostics: dict[str, dict[str, str]] = {}
         self.levels: dict[str, int] = {}
@@ -308,8 +309,8 @@ class Valve:
             return None
         if flag.state == UNKNOWN:
             return Alarm(flag.occurrence, FaultFlag.NE107_FUNCTION_CHECK, 'unknown', False, 0)
-        if flag.occurrence == 0:
-            return None
+        if flag.occurrence == 0 and self.fleet is None:
+            return None  # a fleet's status has no number, and its process may have been restarted
         if not flag.fault and flag.state not in (*ALARMS, SHELVED):
             return None
         mine = [e for e in self.events if e['occurrence'] == flag.occurrence]
@@ -322,7 +323,7 @@ class Valve:
             flag.state, 'returned' if cleared else 'active'
         )
         known = self.diagnostics.get('detector', {}).get('Acknowledged') == 'True'
-        evidence = told[-1].copy() if told else EventRow()
+        evidence = told[-1].copy() if told else EventRow(cause=self.suspected)
         if evidence and state == 'active':  # the event tells how it was then
             evidence |= {
                 'residual': flag.residual,

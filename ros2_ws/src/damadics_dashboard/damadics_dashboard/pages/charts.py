@@ -160,6 +160,7 @@ def signature_plot(names: tuple[str, ...], x: str, y: str) -> Options:
                 'data': [],
                 'symbolSize': 4,
                 'large': True,
+                'largeThreshold': 1,  # one path for all, not an element for each
                 'emphasis': {'disabled': True},
                 'itemStyle': {'opacity': opacity},
             }

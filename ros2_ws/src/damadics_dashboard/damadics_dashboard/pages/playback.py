@@ -57,6 +57,7 @@ class Playback:
     range: tuple[float, float] = (0.0, 1.0)  # s
     truth: Truth | None = None  # where the recording tells it
     monitored: bool = False  # whether it ever judged
+    status: str = ''  # what the monitor said of itself in the end, in English
 
     @property
     def alarms(self) -> list[Event]:
@@ -160,6 +161,8 @@ def _play(recording: Recording, settings: Settings, name: str) -> Playback:
         thinner.add(columns, result)
     if first is None or last is None:
         raise BagError('holds no measurement', recording.path)
+    failed = monitor.estimator.failed_input
+    done.status = f'the input has failed: {failed}' if failed else monitor.status
     done.duration = (last - first) / NANO
     done.range = (first / NANO, last / NANO)
     result, columns = thinner.thinned()

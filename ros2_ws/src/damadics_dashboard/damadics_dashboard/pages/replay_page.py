@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from damadics_fd.core.settings import SettingsError
-from damadics_fd.core.text import COMMENT, NAME, plain
+from damadics_fd.core.text import COMMENT, NAME, SENTENCE, plain
 from damadics_fd.web.limits import LARGEST_UPLOAD
 from nicegui import events, run, ui
 
@@ -19,6 +19,7 @@ from damadics_dashboard.pages.charts import Options, signature_plot, time_plot
 from damadics_dashboard.pages.elements import box, markup, tell, with_values
 from damadics_dashboard.pages.frame import card, frame
 from damadics_dashboard.pages.plots import News, Plot
+from damadics_dashboard.words.answers import answer_words
 from damadics_dashboard.words.findings import cause_of, faults_of
 from damadics_dashboard.words.texts import Texts
 from damadics_dashboard.words.valve_words import history_rows
@@ -185,9 +186,10 @@ def _show(done: 'Playback', mode: str, t: Texts) -> None:
         t.duration(done.duration),
         truth_words(done.truth, t),
         t('suspected', cause=suspect) if suspect and alarms else '',
+        '' if done.monitored else answer_words(done.status, t.language),
     )
     left_out = [t('left_out', what=plain(p, COMMENT)) for p in done.problems[:5]]
-    detail = ' · '.join(plain(fact, COMMENT) for fact in (*facts, *left_out) if fact)
+    detail = ' · '.join(plain(fact, SENTENCE) for fact in (*facts, *left_out) if fact)
     markup('banner.html', kind=kind, title=verdict, detail=detail, figures=[]).classes('w-full')
     message: dict[int, News] = {}
 

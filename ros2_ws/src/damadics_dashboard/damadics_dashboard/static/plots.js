@@ -112,6 +112,13 @@
     });
   }
 
+  // Numbers in a row are taken as they are; pairs would be copied and looked into one by one.
+  function flat(points) {
+    const numbers = new Float64Array(2 * points.length);
+    points.forEach(([x, y], n) => { numbers[2 * n] = x; numbers[2 * n + 1] = y ?? NaN; });
+    return numbers;
+  }
+
   function draw(id) {
     const chart = chartOf(id);
     const entry = charts.get(id);
@@ -131,16 +138,19 @@
     const empty = entry.data.every((points) => !points.length);
     const place = document.querySelector(`[data-plot="${id}"]`);
     if (place && entry.told) { // until then it says that it is loading
-      place.hidden = !empty;
-      place.textContent = entry.absent ? place.dataset.absent : place.dataset.empty;
+      const note = entry.absent ? place.dataset.absent : place.dataset.empty;
+      if (place.hidden === empty) place.hidden = !empty;
+      if (place.textContent !== note) place.textContent = note;
     }
     if (!due(entry, empty)) { entry.late = true; return; }
     entry.late = false;
     entry.filled = !empty;
     entry.drawn = performance.now();
-    const option = { series: entry.data.map((points) => ({ data: points })) };
+    const option = { series: entry.data.map((points) => ({ data: flat(points) })) };
     if (entry.range && !entry.spec.xy) option.xAxis = axis(entry, chart);
-    if (entry.areas) option.series[0].markArea = { data: entry.areas };
+    const marked = JSON.stringify(entry.areas || []);
+    if (marked !== entry.marked) option.series[0].markArea = { data: entry.areas };
+    entry.marked = marked;
     chart.setOption(option);
     // it has been drawn: no frame is needed until the next one (clouds are drawn in parts)
     if (!entry.spec.xy) chart.getZr().animation.stop();
@@ -241,7 +251,7 @@
   }
 
   function register(id, spec) {
-    charts.set(id, { spec, data: spec.colors.map(() => []) });
+    charts.set(id, { spec, data: spec.colors.map(() => []), marked: '[]' });
     const wait = () => (chartOf(id) ? draw(id) : setTimeout(wait, 50));
     wait();
   }

@@ -3,6 +3,7 @@
 """What is said of a valve, its alarm and its history, as plain text in the reader's language."""
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from urllib.parse import quote
@@ -24,9 +25,10 @@ from damadics_dashboard.words.findings import (
     of_limit,
     signs_of,
 )
-from damadics_dashboard.words.texts import Texts
+from damadics_dashboard.words.texts import DASH, Texts
 
 RECENT = 3.0  # s; diagnostics come every second
+UNMONITORED = re.compile('not monitored[,:] ')  # the title says it
 LEARNING = ' %: '  # before what an estimator says of why it learns for long
 TRANSITIONS = {
     FaultEvent.RAISED: 'raised',
@@ -114,7 +116,7 @@ def reason_of(valve: Valve, condition: Condition, t: Texts, now: float) -> str:
         said = plain(told.get('Message', ''), SENTENCE)
         if said and valve.levels.get('estimator', 0):
             if condition.detail == 'input_refused':
-                return answer_words(said, t.language)
+                return answer_words(UNMONITORED.sub('', said), t.language)
             if condition.kind == 'learn' and (why := said.partition(LEARNING)[2]):
                 return f'{detail_of(condition, t)}: {answer_words(why, t.language)}'
     return detail_of(condition, t)
@@ -139,8 +141,8 @@ def alarm_words(valve: Valve, alarm: Alarm, t: Texts, *, name: bool) -> AlarmWor
     ratio, limit = e.get('ratio'), e.get('threshold')
     unit = '' if limit == STATISTIC else '1/s'
     cells = [
-        (t('alarm_number'), str(alarm.occurrence)),
-        (t('numbers'), numbers or '–'),
+        (t('alarm_number'), str(alarm.occurrence or DASH)),
+        (t('numbers'), numbers or DASH),
         (t('largest_residual'), of_limit(ratio, t)),
         (t('residual_now'), t.number(e.get('residual'), unit)),
         (t('limit'), t.number(limit, unit)),
@@ -157,7 +159,7 @@ def alarm_words(valve: Valve, alarm: Alarm, t: Texts, *, name: bool) -> AlarmWor
         t('since_time', time=t.moment(alarm.onset)) if alarm.onset else '',
         found_by(e, t),
         numbers_of(e, t),
-        [cell for cell in cells if cell[1] != '–'],
+        [cell for cell in cells if cell[1] != DASH],
     )
 
 

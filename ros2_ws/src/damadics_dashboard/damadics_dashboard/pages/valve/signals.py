@@ -38,7 +38,8 @@ class Signals:
     def __init__(self, valve: Valve, t: Texts, recent: float) -> None:
         self._valve = valve
         self._t = t
-        self._notes = Notes(t('loading'), t('no_data_yet'), t('not_measured'))
+        empty = t('no_data_yet') if valve.fleet is None else t('no_samples_of_fleet')
+        self._notes = Notes(t('loading'), empty, t('not_measured'))
         self.curves: dict[int, list[Curve]] = {}
         with box('div', 'stack'):
             self._position()

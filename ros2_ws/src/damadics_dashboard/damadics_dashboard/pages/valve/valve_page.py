@@ -32,6 +32,7 @@ PERIOD = 0.2  # s
 SIGNATURE_NOW = 30.0  # s
 WINDOWS = (10.0, 60.0, 600.0)  # s
 HISTORY = 30  # rows
+ARRIVES = 5.0  # s, within which samples come where there are any
 
 
 class Figure(TypedDict):
@@ -92,7 +93,9 @@ class _Page:
         self._valve = valve
         self._t = t
         self._second = 0
-        self._paused = self._stale = False
+        self._paused = False
+        self._opened = time.monotonic()
+        self._missing = (False, False)  # the valve is silent; what comes would have come
         self._clouds: tuple[Points, Points] | None = None  # goes with the curves: one drawing
         self._head(window)
         self._banner = markup('banner.html', kind='off', title='', detail='', figures=[])
@@ -194,10 +197,11 @@ class _Page:
         tell('age', None if old is None else round(old, 1))
         stale = condition.kind == 'off'
         self._grid.classes(add='stale' if stale else '', remove='' if stale else 'stale')
-        bare = stale and all(trace.newest < 0 for trace in valve.traces.values())
-        if stale and not self._stale:  # until then what has not come is on its way
+        waited = now - self._opened > ARRIVES
+        bare = (stale or waited) and all(trace.newest < 0 for trace in valve.traces.values())
+        if (stale, waited) > self._missing:  # until then what has not come is on its way
             tell('push', self._feed.nothing())
-        self._stale = stale
+        self._missing = (stale, waited)
         self._grid.classes(add='bare' if bare else '', remove='' if bare else 'bare')
         self._alarm_box.set_visibility(self._alarms.update() > 0)
         if self._watcher.offers(self._valve.name, 'inject_fault') != self._simulated:
@@ -216,7 +220,7 @@ class _Page:
             redraw(self._commission, 'commission.html', words=commission_words(told, self._t))
             if self._strokes is not None:
                 self._strokes.update()
-            if not self._paused and (stale or valve.traces['estimate'].newest >= 0):
+            if not self._paused and (stale or waited or valve.traces['estimate'].newest >= 0):
                 self._clouds = signature(valve.traces['estimate'], SIGNATURE_NOW)
 
     def _banner_values(self, condition: Condition, now: float, clock: int) -> Banner:
