@@ -21,6 +21,11 @@ class Options(TypedDict, total=False):
     series: list[Saved]
 
 
+# margins hold all labels: to look for room at each drawing costs a fifth of it
+FIXED: Saved = {'outerBoundsMode': 'none'}
+STAYS: Saved = {'nameMoveOverlap': False}
+
+
 def time_plot(
     names: list[str],
     unit: str,
@@ -46,6 +51,7 @@ def time_plot(
     :return: ECharts options.
     """
     axis: Saved = {
+        **STAYS,
         'type': 'log' if log else 'value',
         'name': unit,
         'nameTextStyle': {'align': 'left'},
@@ -64,6 +70,7 @@ def time_plot(
     return {
         'animation': False,
         'grid': {
+            **FIXED,
             'left': 54,
             'right': 46 if right else 30,
             'top': 46 if right else 34,
@@ -93,6 +100,7 @@ def time_plot(
             }
         ],
         'xAxis': {
+            **STAYS,
             'type': 'value',
             'min': 0,
             'max': 60,
@@ -134,10 +142,11 @@ def signature_plot(names: tuple[str, ...], x: str, y: str) -> Options:
     """
     return {
         'animation': False,
-        'grid': {'left': 54, 'right': 16, 'top': 50, 'bottom': 40},
+        'grid': {**FIXED, 'left': 54, 'right': 16, 'top': 50, 'bottom': 40},
         'legend': {'top': 0, 'right': 6, 'itemWidth': 10, 'itemHeight': 10, 'icon': 'circle'},
         'tooltip': {'trigger': 'item', 'confine': True},
         'xAxis': {
+            **STAYS,
             'type': 'value',
             'name': x,
             'nameLocation': 'middle',
@@ -146,6 +155,7 @@ def signature_plot(names: tuple[str, ...], x: str, y: str) -> Options:
             'splitNumber': 5,
         },
         'yAxis': {
+            **STAYS,
             'type': 'value',
             'name': y,
             'nameTextStyle': {'align': 'left'},

@@ -84,7 +84,7 @@
       axisLine: { onZero: false, lineStyle: { color: line } },
       axisTick: { lineStyle: { color: line } },
       splitLine: { lineStyle: { color: line, opacity: 0.6 } },
-      axisLabel: { color: muted, hideOverlap: true },
+      axisLabel: { color: muted },
       nameTextStyle: { color: muted },
     };
     const label = (format) => ({ ...look.axisLabel, formatter: format });
@@ -97,12 +97,13 @@
       legend: { textStyle: { color: muted }, inactiveColor: line },
       tooltip: {
         backgroundColor: card, borderColor: line, textStyle: { color: ink },
-        valueFormatter: (v) => (v == null ? '–' : short(v)),
+        valueFormatter: (v) => (Number.isFinite(v) ? short(v) : '–'),
       },
       axisPointer: { label: { formatter: (p) => (p.axisDimension === 'x' && !spec.xy
         ? clock(p.value, span(), true) : short(p.value)) } },
-      xAxis: { ...look, axisLabel: label(spec.xy ? short : (v) => clock(v, span(), false,
-        narrow(chart))) },
+      xAxis: { ...look,
+        axisLabel: { ...label(spec.xy ? short : (v) => clock(v, span(), false, narrow(chart))),
+          hideOverlap: true } },
       yAxis: ordinates,
       series: spec.colors.map((name) => ({
         lineStyle: { color: css(name) }, itemStyle: { color: css(name) },
