@@ -95,6 +95,7 @@ def test_a_report_names_the_tag_after_a_restart_too(tmp_path):
     assert history.tags() == {'lv101': 'LV-101'}
     report = valve_report(Sources(history, trends), 'lv101', 0.0, 1e9, EN)
     assert report.title == 'Report on lv101 LV-101' and ('Tag', 'LV-101') in report.facts
+    assert ('Time with data', '–') in report.facts, 'no trend yet is not 0 s'
     history.close()
     trends.close()
 

@@ -15,7 +15,7 @@ from damadics_dashboard.store.rows import ActionRow, EventRow
 from damadics_dashboard.words.answers import result_words
 from damadics_dashboard.words.findings import found_by, headline
 from damadics_dashboard.words.outlook import outlook_words, value_words
-from damadics_dashboard.words.texts import Texts
+from damadics_dashboard.words.texts import DASH, Texts
 from damadics_dashboard.words.valve_words import TRANSITIONS, history_rows
 
 DAY = 86400.0
@@ -177,7 +177,7 @@ def valve_report(sources: Sources, valve: str, since: float, until: float, t: Te
             (t('alarms'), str(len(alarms))),
             (t('mtbf'), t.duration(mtbf)),
             (t('mttr'), t.duration(mttr)),
-            (t('measured_time'), t.duration(min(measured, until - since))),
+            (t('measured_time'), t.duration(min(measured, until - since)) if trends else DASH),
         ],
         [line for line in summary if line],
         tables,
