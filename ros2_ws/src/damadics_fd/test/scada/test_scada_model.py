@@ -5,7 +5,7 @@
 import numpy as np
 import pytest
 from damadics_fd.core.scada.laws.actuator import nominal_flow, valve_flow
-from damadics_fd.core.scada.model import FAULTS, STEM, advance_stem, start_stem
+from damadics_fd.core.scada.model import FAULTS, STEM, advance_stem, advance_two, start_stem
 from damadics_fd.core.valve.flow import density
 from damadics_fd.core.valve.parameters import Valve
 from damadics_fd.core.valve.plug import RECOVERY, recovery
@@ -130,3 +130,22 @@ def start_mass(act):
     stem = np.zeros(1, STEM)
     start_stem(stem[0], act[0], 0.0)
     return stem[0].m_a
+
+
+def test_two_stems_side_by_side_move_as_each_does_alone():
+    rng = np.random.default_rng(3)
+    fault = np.zeros(2, FAULTS)
+    for name in FAULTS.names:
+        fault[0] = np.zeros(1, FAULTS)[0]
+        fault[0][name] = rng.uniform(0.05, 1.0)
+        alone, beside = np.zeros(2, STEM), np.zeros(2, STEM)
+        for stem in (*alone, *beside):
+            start_stem(stem, ACT[0], 0.0)
+        cv = np.repeat(rng.uniform(0.0, 1.0, 5), 4)
+        for k in range(1, len(cv)):
+            drop = DROP + 0.02 * rng.standard_normal(2)
+            inputs = (k - 1.0, float(k), cv[k - 1], cv[k], *drop, 0.01, -0.01)
+            one = [advance_stem(alone[i], ACT[0], fault[i], *inputs) for i in range(2)]
+            two = advance_two(beside[0], beside[1], ACT[0], fault[0], fault[1], *inputs)
+            assert tuple(one) == two
+        assert alone.tobytes() == beside.tobytes(), name

@@ -24,7 +24,7 @@ from damadics_fd.core.scada.judging.pressure import (
 from damadics_fd.core.scada.laws.actuator import nominal_flow
 from damadics_fd.core.scada.laws.flow_law import characteristic, sizing
 from damadics_fd.core.scada.laws.stem_law import advance_track, position
-from damadics_fd.core.scada.model import advance_stem, copy_stem
+from damadics_fd.core.scada.model import advance_two, copy_stem
 from damadics_fd.core.scada.settings import ScadaConfig
 from damadics_fd.core.scada.state import HISTORY_LENGTH, LAW, MonitorState, Reference
 
@@ -201,11 +201,20 @@ def predict(
             slope0 = (z0 - z1) / dt
             slope1 = slope0
         cv1 = s.cv[1] if ref.hold else cv
-        s.xm[0] = advance_stem(
-            s.stem[0], cfg.act, s.fault[0], t0, t, s.cv[1], cv1, z1, z0, slope0, slope1
-        )
-        s.xd = advance_stem(
-            s.stem[1], cfg.act, s.fault[1], t0, t, s.cv[1], cv1, z1, z0, slope0, slope1
+        s.xm[0], s.xd = advance_two(
+            s.stem[0],
+            s.stem[1],
+            cfg.act,
+            s.fault[0],
+            s.fault[1],
+            t0,
+            t,
+            s.cv[1],
+            cv1,
+            z1,
+            z0,
+            slope0,
+            slope1,
         )
         s.xs = s.xm[0]
         s.xq = s.xm[0]
