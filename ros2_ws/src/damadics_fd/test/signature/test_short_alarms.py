@@ -17,7 +17,7 @@ from damadics_fd.core.signature.own_alarm import (
 )
 from damadics_fd.core.signature.settings import SignatureSettings
 from damadics_fd.core.signature.signature import Signature
-from damadics_fd.core.signature.step import CHANGED, QUIET
+from damadics_fd.core.signature.step import CHANGED, QUIET, pass_by
 
 from .balance import DT, QUICK, Strokes, take
 
@@ -260,3 +260,30 @@ def test_a_reference_that_cannot_be_is_refused(learned, wrong):
 def test_settings_that_no_valve_has_are_refused(wrong, said):
     with pytest.raises(ValueError, match=said):
         SignatureSettings(**wrong)
+
+
+def test_a_sample_within_a_block_leaves_what_the_whole_step_leaves(learned):
+    whole, strokes = monitoring(learned, seed=13)
+    short, _ = monitoring(learned, seed=13)
+    stamp, x, ps, dp = strokes.columns(strokes.motion(8.0))
+    keep = np.arange(len(stamp)) % 40 != 7
+    keep[100:140] = False  # a gap of ten blocks
+    stamp[60:62], x[80], ps[90], dp[95] = stamp[59], np.nan, np.inf, np.nan
+    stamp[200:] -= 3 * SECOND  # the clock was set back while the filters settle
+    passed = 0
+    for i in np.flatnonzero(keep):
+        values = int(stamp[i]), float(x[i]), float(ps[i]), float(dp[i])
+        ready, alarm = not 190 <= i < 201, i >= 260
+        take(whole, [np.array([value]) for value in values], alarm, ready)
+        before = short.state.tobytes()
+        if pass_by(short.state[0], short.record[0], *values, ready, alarm):
+            passed += 1
+        else:
+            assert short.state.tobytes() == before
+            take(short, [np.array([value]) for value in values], alarm, ready)
+        assert short.state.tobytes() == whole.state.tobytes()
+    assert passed > 0.6 * keep.sum()
+    blind = Signature(dataclasses.replace(QUICK, available=False))
+    before = blind.state.tobytes()
+    assert pass_by(blind.state[0], blind.record[0], SECOND, 0.5, 1e5, 9e5, True, False)
+    assert blind.state.tobytes() == before

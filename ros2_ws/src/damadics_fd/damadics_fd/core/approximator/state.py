@@ -64,13 +64,8 @@ class Transmitter(Record):
 
 
 class Guard(Record):
-    """The force balance in blocks of the learning time."""
+    """The force balance in blocks of the learning time; what every sample needs comes last."""
 
-    elapsed: int  # ns since the first sample, gaps that restart the filters left out
-    place: float
-    direction: float
-    moved: int
-    travel: float
     block: Annotated[Floats, SUMS]
     base: Annotated[Floats, SUMS]
     pool: Annotated[Floats, SUMS]
@@ -83,6 +78,11 @@ class Guard(Record):
     cov: Annotated[Floats, FORCE, FORCE]
     sigma: float
     drift: float
+    elapsed: int  # ns since the first sample, gaps that restart the filters left out
+    place: float
+    direction: float
+    moved: int
+    travel: float
 
 
 class State(Guard, Velocity, Observer, Transmitter):

@@ -31,14 +31,12 @@ class Approximators(Held):
         self.ahead = places(  # of fields that nearly every sample needs
             [
                 Part(self.quality),
-                Part(self.states, last='travel'),
-                Part(self.states, 'y'),
+                Part(self.states, 'elapsed'),
                 Part(self.detectors, last='near_misses'),
                 Part(self.detectors, 'shelved_until'),
                 Part(self.estimates),
                 Part(self.decisions),
                 Part(self.signatures, last='run'),
-                Part(self.signatures, 'own', 'confidence'),
             ]
         )
         self._room = np.empty(0, Decision.dtype())  # for decisions, kept from call to call

@@ -59,7 +59,9 @@ def step(s: State, c: Settings, g: Known, gc: SignatureSettings, e: Estimate, d:
         vote.clear(s)
     cause = g.cause
     ready = e.phase not in (PHASE_PAPER, PHASE_HOLD)
-    signature_step.step(g, gc, e.stamp, e.x1, e.ps, e.dp, ready, s.active or s.latched)
+    alarmed = s.active or s.latched
+    if not signature_step.pass_by(g, gc, e.stamp, e.x1, e.ps, e.dp, ready, alarmed):
+        signature_step.step(g, gc, e.stamp, e.x1, e.ps, e.dp, ready, alarmed)
     own = own_alarm.own_level(g, gc)
     exceed_any, worst = exceed or own > 0, max(level, own)
     d.transitions = 0

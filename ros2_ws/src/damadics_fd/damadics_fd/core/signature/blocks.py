@@ -122,7 +122,7 @@ def add_sample(
     s.n += 1
     s.sx += x
     s.sp += pb
-    s.su += c.weight / c.force_scale + pb - dp * plug_gain(c, x)
+    s.su += c.weight_share + pb - dp * plug_gain(c, x)
     s.sg += dp
     s.st += offset
     s.srr += raw * raw

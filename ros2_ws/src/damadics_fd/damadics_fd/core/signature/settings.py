@@ -25,7 +25,7 @@ class SignatureSettings(Section):
     The geometry describes the valve, the rest follows the rules in docs/signature.md.
     """
 
-    DERIVED: ClassVar[tuple[str, ...]] = ('block_ns', 'min_samples', 'carried')
+    DERIVED: ClassVar[tuple[str, ...]] = ('block_ns', 'min_samples', 'carried', 'weight_share')
 
     # geometry; defaults: DAMADICS actuator
     force_scale: float = VALVE.force_scale  # [N] FN = K L
@@ -147,6 +147,11 @@ class SignatureSettings(Section):
     def carried(self) -> float:
         """Share of a slip's variance that the delay carries into the next block."""
         return math.exp(-self.block / self.ps_lag) if self.ps_lag > 0.0 else 0.0
+
+    @property
+    def weight_share(self) -> float:
+        """Weight / FN: a division less in each sample."""
+        return self.weight / self.force_scale
 
     def problems(self) -> list[str]:
         """

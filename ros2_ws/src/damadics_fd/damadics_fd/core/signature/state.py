@@ -274,9 +274,13 @@ class Work(Record):
 
 
 class State(
-    Clock, Phase, Blocks, Reference, Learning, Sums, Evidence, Sizes, Cues, OwnAlarm, Cause, Air
+    OwnAlarm, Cause, Clock, Phase, Blocks, Reference, Learning, Sums, Evidence, Sizes, Cues, Air
 ):
-    """All that is remembered, each part written by one file; scratch in records of its own."""
+    """
+    All that is remembered, each part written by one file; scratch in records of its own.
+
+    What every sample needs stands first, side by side in the cache.
+    """
 
     block: Block
     work: Work
