@@ -18,12 +18,12 @@ from numba.core.typing.context import BaseContext as Typing
 from numba.core.typing.templates import Signature
 from numba.extending import intrinsic
 
-from damadics_fd.core.jit import jit, settings
+from damadics_fd.core.jit import layer, settings
 from damadics_fd.core.record import Array, Ints
 
 Lower = Callable[[BaseContext, ir.IRBuilder, Signature, Sequence[ir.Value]], ir.Value]
 LINE = 64  # bytes of the cache that come at once
-CACHE = 1 << 22  # bytes of records that the cache holds: nothing is to be fetched ahead
+CACHE = 1 << 20  # bytes of records that a core's own cache holds: nothing is to be fetched ahead
 
 
 class Part(NamedTuple):
@@ -98,7 +98,7 @@ if not settings.DISABLE_JIT:
         return types.void(types.int64), lower
 
 
-@jit
+@layer
 def fetch(where: Ints, v: int) -> None:
     """
     Ask for the records of a valve.

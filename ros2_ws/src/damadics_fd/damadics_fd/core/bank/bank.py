@@ -117,11 +117,14 @@ class Bank:
             raise ValueError(f'valve must be a column of whole numbers, not {_kind(valve)}')
         if stamp.shape != valve.shape or stamp.dtype != np.int64:
             raise ValueError(f'stamp must be a column of {len(valve)} int64, not {_kind(stamp)}')
-        if len(valve) and not 0 <= int(valve.min()) <= int(valve.max()) < len(self):
+        least = 0 if valve.dtype.kind == 'u' else valve.min(initial=0)
+        if least < 0 or not valve.max(initial=0) < len(self):
             wrong = valve[(valve < 0) | (valve >= len(self))][0]
             raise ValueError(f'valve {wrong} is not in the bank of {len(self)}')
-        nothing = np.full(len(valve), np.nan)
-        columns = [np.asarray(signals.get(name, nothing)) for name in SIGNALS]
+        columns = [
+            np.asarray(signals[name]) if name in signals else np.full(len(valve), np.nan)
+            for name in SIGNALS
+        ]
         for name, column in zip(SIGNALS, columns, strict=True):
             if column.shape != valve.shape or column.dtype.kind not in 'fiu':
                 raise ValueError(

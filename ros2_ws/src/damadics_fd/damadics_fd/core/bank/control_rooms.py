@@ -117,14 +117,12 @@ class ControlRooms(Held):
     def _decide(self, v: int) -> bool:
         w = int(self.which[v])
         return decide(
-            self.detectors,
-            self.signatures,
-            self.estimates,
-            self.decisions,
-            v,
+            self.detectors[v],
+            self.signatures[v],
+            self.estimates[v],
+            self.decisions[v],
             self.records[w],
-            self.signature_records,
-            w,
+            self.signature_records[w],
         )
 
     def estimator(self, v: int) -> ScadaEstimator:

@@ -15,12 +15,15 @@ from damadics_fd.core.approximator import step as approximator
 from damadics_fd.core.approximator.state import Estimate, State
 from damadics_fd.core.bank.ahead import fetch
 from damadics_fd.core.decision import judge
+from damadics_fd.core.decision.events import Decision
 from damadics_fd.core.jit import jit
 from damadics_fd.core.quality import ACCEPTED, Quality
 from damadics_fd.core.record import Array, Floats, Ints, Record, Rows
 from damadics_fd.core.sample import SIGNALS
 from damadics_fd.core.scada import kernel
 from damadics_fd.core.settings import Settings
+from damadics_fd.core.signature.settings import SignatureSettings
+from damadics_fd.core.signature.state import State as Known
 
 LATER = 255  # instead of a reason: the valve is still learned in mode scada, which is not compiled
 Reasons = NDArray[np.uint8]
@@ -71,35 +74,23 @@ def note(
 
 @jit
 def decide(
-    ds: Rows[judge.State],
-    g: Array,
-    e: Rows[Estimate],
-    d: Array,
-    v: int,
-    c: Settings,
-    gc: Array,
-    w: int,
+    ds: judge.State, g: Known, e: Estimate, d: Decision, c: Settings, gc: SignatureSettings
 ) -> bool:
     """
-    Judge the latest estimate of one valve.
+    Judge the latest estimate of one valve. It takes records: arrays would be counted in each row.
 
-    :param ds: detector states.
-    :param g: states of the signature.
-    :param e: latest estimates.
-    :param d: latest decisions, written.
-    :param v: which valve.
-    :param c: its settings.
-    :param gc: settings of signatures.
-    :param w: which of them are the valve's.
+    :param ds: state of the detector.
+    :param g: state of the signature.
+    :param e: latest estimate.
+    :param d: latest decision, written.
+    :param c: settings.
+    :param gc: settings of the signature.
     :return: True where a transition happened or the flag shows something else.
     """
-    now = d[v]
-    fault, state, level = now.fault, now.state, now.level
-    judge.step(ds[v], c, g[v], gc[w], e[v], now)
-    judge.report(ds[v], g[v], gc[w], e[v], now)
-    return bool(
-        now.transitions != 0 or now.fault != fault or now.state != state or now.level != level
-    )
+    fault, state, level = d.fault, d.state, d.level
+    judge.step(ds, c, g, gc, e, d)
+    judge.report(ds, g, gc, e, d)
+    return bool(d.transitions != 0 or d.fault != fault or d.state != state or d.level != level)
 
 
 @jit
@@ -173,7 +164,7 @@ def take_approximator(
             note(
                 r[v], q[v], reason[i], stamp[i], cv[i], x1[i], p1[i], p2[i], t1[i], flow[i], ps[i]
             )
-        elif decide(ds, g, e, d, v, c[w], gc, w):
+        elif decide(ds[v], g[v], e[v], d[v], c[w], gc[w]):
             changed[count] = i
             decisions[count] = d[v]
             count += 1
@@ -254,7 +245,7 @@ def take_control_room(
             note(
                 r[v], q[v], reason[i], stamp[i], cv[i], x1[i], p1[i], p2[i], t1[i], flow[i], ps[i]
             )
-        elif decide(ds, g, e, d, v, c[w], gc, w):
+        elif decide(ds[v], g[v], e[v], d[v], c[w], gc[w]):
             changed[count] = i
             decisions[count] = d[v]
             count += 1
