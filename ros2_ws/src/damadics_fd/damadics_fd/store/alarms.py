@@ -2,12 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Keep the alarm of a detector over its restart, its kill included; what is lost is told."""
 
+import contextlib
 import os
 from pathlib import Path
 from typing import NamedTuple
 
 from damadics_fd.core.record import Plain, Saved
 from damadics_fd.ros.arguments import state_folder
+from damadics_fd.store.claims import claim
 from damadics_fd.store.slots import (
     parse,
     read_bounded,
@@ -17,6 +19,8 @@ from damadics_fd.store.slots import (
 )
 
 FORMAT = 'damadics_fd alarm 2'
+UNKEPT = 'the alarm would not survive a restart'
+REMEDY = 'end it, or give each detector an alarm_folder of its own'
 FORMAT_0_1 = 'damadics_fd alarm 1'  # one file, `NAME.alarm.json`, without a hash
 # what makes an alarm another one; the rest of the state changes with every sample
 MARKS = (
@@ -63,6 +67,7 @@ class AlarmStore:
         self.problem = ''  # why the latest state is not kept, '' if it is
         self._old = path.with_name(f'{path.name}.json')  # of version 0.1
         self._marks: list[Plain] = []
+        self._claimed = f'another process keeps its alarms in {path}: {REMEDY}'
 
     def load(self) -> Kept | None:
         """
@@ -71,6 +76,9 @@ class AlarmStore:
         :return: what `Detector.load` takes; None where none was kept.
         :raises LostAlarmError: where there was one and it is damaged, with the cause.
         """
+        with contextlib.suppress(OSError):  # where it cannot be written, `save` tells why
+            if not claim(self.path):
+                self.problem = f'{UNKEPT}: {self._claimed}'
         slots = read_slots(self.path, FORMAT)
         problems = [f'{slot.file}: {slot.problem}' for slot in slots if slot.problem]
         good = [slot.content for slot in slots if slot.content is not None]
@@ -96,10 +104,12 @@ class AlarmStore:
         if marks == self._marks and not self.problem and not again:
             return
         try:
+            if not claim(self.path):
+                raise OSError(self._claimed)
             write_slot(self.path, FORMAT, state, both=True)
             self._old.unlink(missing_ok=True)
         except OSError as problem:
-            self.problem = f'the alarm would not survive a restart: {problem}'
+            self.problem = f'{UNKEPT}: {problem}'
             return
         self.problem, self._marks = '', marks
 

@@ -5,6 +5,10 @@
 import contextlib
 import errno
 import json
+import os
+import shutil
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -95,3 +99,39 @@ def test_what_could_not_be_saved_is_told_and_saved_later(store, monkeypatch):
     store.save({**ALARM, 'acknowledged': True})
     assert store.problem == ''
     assert AlarmStore(store.path).load().state == {**ALARM, 'acknowledged': True}
+
+
+ANOTHER = """
+import json, sys
+from pathlib import Path
+from damadics_fd.store.alarms import AlarmStore
+store = AlarmStore(Path(sys.argv[1]))
+kept = store.load()
+for state in (json.loads(line) for line in sys.stdin):
+    store.save(state)
+    print(store.problem, flush=True)
+"""
+
+
+def test_two_processes_of_one_file_lose_no_alarm(store):
+    with subprocess.Popen(
+        [sys.executable, '-c', ANOTHER, store.path],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        env={**os.environ, 'PYTHONPATH': os.pathsep.join(sys.path)},
+        text=True,
+    ) as another:
+
+        def save(state: dict) -> str:
+            another.stdin.write(json.dumps(state) + '\n')
+            another.stdin.flush()
+            return another.stdout.readline()
+
+        assert 'another process keeps its alarms' in save(STATE)
+        assert AlarmStore(store.path).load().state == ALARM
+        shutil.rmtree(store.path.parent)  # with the claims
+        store.save({**ALARM, 'acknowledged': True})
+        assert store.problem == '' and 'another process' in save(STATE)
+        another.kill()
+    again = AlarmStore(store.path)
+    assert again.load().state == {**ALARM, 'acknowledged': True} and again.problem == ''
