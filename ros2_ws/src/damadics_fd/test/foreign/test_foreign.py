@@ -5,6 +5,7 @@
 import numpy as np
 import pytest
 from damadics_fd.commands.commission.balance import find_balance
+from damadics_fd.commands.commission.breakaway import breakaway
 from damadics_fd.commands.commission.monitor import identify
 from damadics_fd.commands.commission.signals import gather
 from damadics_fd.commands.commission.twin.constants import twin
@@ -173,6 +174,25 @@ def test_a_standing_fault_is_one_occurrence():
     loop = courses.control(1800.0, 26)
     t = trial(build, proposal, 'friction +300 %', 26, quiet=300.0, after=1500.0, cv=loop)
     assert t.occurrences <= 1
+
+
+@pytest.mark.parametrize('seed', [923, 925, 965])
+def test_static_friction_is_found_however_fast_the_stem_is_pulled(seed):
+    build = kinds.random_valve(seed)
+    b = balance(build, seed, minutes=5.0)
+    columns = foreign.simulate(build, courses.steps(300.0, seed), seed=seed)
+    found = breakaway(gather([FaultFree('strokes', columns)]), b.settings, b.friction)
+    assert found.force == pytest.approx(build.static * build.dry * build.force, rel=0.08)
+
+
+@pytest.mark.parametrize('lag', [0.1, 0.2])
+def test_a_lag_of_the_pressure_is_no_hysteresis_of_the_diaphragm(lag):
+    build = kinds.random_valve(7501, ps_lag=lag)
+    proposal = commissioned(build, 7501)
+    assert proposal.settings.hysteresis < 0.1 * build.dry * build.force
+    t = trial(build, proposal, 'friction +100 %', 7501, quiet=300.0)
+    assert t.size == pytest.approx(1.0, rel=0.15)
+    assert abs(t.size - t.true) < 2.0 * t.std
 
 
 def test_hysteresis_of_the_diaphragm_is_no_friction():

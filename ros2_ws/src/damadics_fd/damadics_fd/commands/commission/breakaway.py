@@ -14,7 +14,6 @@ import numpy as np
 
 from damadics_fd.commands.commission.lag import Mask, plug_per_pascal
 from damadics_fd.commands.commission.signals import Blocks, Signals, blocks
-from damadics_fd.core.approximator.transmitter import delay_column
 from damadics_fd.core.record import Floats
 from damadics_fd.core.settings import Settings
 
@@ -31,7 +30,7 @@ UNSURE, MODEL = 0.15, 0.02  # deviation as a share of the hysteresis, and of the
 class Breakaway(NamedTuple):
     """What a stem bears when it begins to move."""
 
-    force: float  # [N] the median; 0 where no stroke began in mid-stroke
+    force: float  # [N] static friction; 0 where no stroke began in mid-stroke
     hysteresis: float  # [N] of the diaphragm; 0 where none is seen
     hysteresis_std: float  # [N]
 
@@ -49,11 +48,8 @@ def breakaway(signals: Signals, s: Settings, friction: float) -> Breakaway:
     :param friction: dry friction of the moving stem, hysteresis included [N].
     :return: what was found.
     """
-    b = blocks(signals, SHORT, s.ps_lag)
+    b = blocks(signals, SHORT)
     x, dp = signals.x, signals.dp
-    if s.ps_lag > 0.0:
-        dt = np.diff(signals.t, prepend=-np.inf)
-        x, dp = delay_column(x, dt, s.ps_lag), delay_column(dp, dt, s.ps_lag)
     noise = 1.4826 * float(np.median(np.abs(np.diff(x, 3)))) / np.sqrt(20.0)
     borne, starts = [], []
     whole = b.index[2:] - b.index[:-2] == 2
@@ -66,23 +62,23 @@ def breakaway(signals: Signals, s: Settings, friction: float) -> Breakaway:
         place, way = float(np.mean(xs[still])), float(np.sign(b.v[k + 2]))
         left = int(np.argmax(_twice((xs - place) * way > AWAY * noise) & (t >= b.t[k])))
         plug = float(plug_per_pascal(s, np.array([place]))[0]) * dp[first:last]
-        force = s.mass * s.gravity + s.signed_area * signals.ps[first:last]
-        force -= (plug if s.flow_to == 'open' else -plug) + s.stiffness * s.stroke * (
-            place + s.spring_origin
-        )
+        air = s.signed_area * signals.ps[first:last] * way
+        held = s.mass * s.gravity - (plug if s.flow_to == 'open' else -plug)
+        held = (held - s.stiffness * s.stroke * (place + s.spring_origin)) * way
         near = t >= b.t[k] - 1.5 * SHORT
-        seen = _force_before(t[near], force[near] * way, float(t[left]))
+        seen, rate = _line_before(t[near], held[near], air[near], float(t[left]), s.ps_lag)
         if left == 0 or np.isnan(seen):
             continue
-        borne.append(seen)
+        borne.append((seen, rate))
         speed = np.polyfit(t[left:], xs[left:] * way, 1)[0] if len(t) - left > 2 else 0.0
         onset = float(t[left]) - min(AWAY * noise / max(float(speed), 1e-9), 2.0 * SHORT)
-        starts.append((_force_before(t, force * way, onset), came_from(b, int(k), place) * way))
+        at_onset, _ = _line_before(t, held, air, onset, s.ps_lag)
+        starts.append((at_onset, came_from(b, int(k), place) * way))
     if not borne:
         return Breakaway(0.0, 0.0, 0.0)
     forces, ways = np.array([start for start in starts if np.isfinite(start[0])]).reshape(-1, 2).T
     found = hysteresis(forces[ways > 0.0], forces[ways < 0.0], friction)
-    return Breakaway(max(float(np.median(borne)), 0.0), *found)
+    return Breakaway(max(static_friction(*np.array(borne).T), 0.0), *found)
 
 
 def _twice(away: Mask) -> Mask:
@@ -90,12 +86,41 @@ def _twice(away: Mask) -> Mask:
     return both
 
 
-def _force_before(t: Floats, force: Floats, at: float) -> float:
-    """Return the force at an instant, by a line through the tenth of a second before it."""
+def _line_before(
+    t: Floats, held: Floats, air: Floats, at: float, lag: float
+) -> tuple[float, float]:
+    """
+    Return the force at an instant and its rate, by lines through the tenth before it.
+
+    What a transmitter of first order shows lags its input by its own rate times the lag.
+    """
     before = (t < at - 0.1 * SHORT) & (t >= at - 2.0 * SHORT)
     if before.sum() < 4:
-        return float('nan')
-    return float(np.polyfit(t[before] - at, force[before], 1)[1])
+        return float('nan'), float('nan')
+    since = t[before] - at
+    (held_rate, held_at), (air_rate, air_at) = (
+        np.polyfit(since, force[before], 1) for force in (held, air)
+    )
+    return float(held_at + air_at + lag * air_rate), float(held_rate + air_rate)
+
+
+def static_friction(force: Floats, rate: Floats) -> float:
+    """
+    Return the force at which a stem leaves its place, however slowly it is pulled.
+
+    The faster the force rises, the more it has risen by the time that the stem is seen to have
+    left: the line of Theil and Sen through force over rate tells what it is at a rate of 0.
+
+    :param force: of each start, as its stem was seen to leave [N].
+    :param rate: at which it rose [N/s].
+    :return: [N].
+    """
+    i, j = np.triu_indices(len(force), 1)
+    apart = np.abs(rate[j] - rate[i]) > 1e-9 * np.max(np.abs(rate), initial=1e-9)
+    if not apart.any():
+        return float(np.median(force))
+    slope = float(np.median((force[j] - force[i])[apart] / (rate[j] - rate[i])[apart]))
+    return float(np.median(force - slope * rate))
 
 
 def came_from(b: Blocks, k: int, place: float) -> float:
