@@ -97,12 +97,11 @@ class DetectorNode(MonitoringNode):
         self._core.reset()
         self._decision, self._judged, self._twice = None, 0, 0
         self.phase, self.last = PHASE_INIT, -1
-        self._was_silent, self._looked = True, -1e9
+        self._was_silent, self._looked, self._tag = True, -1e9, ''
         self._live = LiveJudgement(self._core)
-        self._tag = ''
         self._flag = FaultFlag()
         self._flag.header.frame_id = self.actuator
-        self._samples = JudgedSamples(made)
+        self._samples = JudgedSamples(made, self._core)
         self._fault_flag = made.publisher(FaultFlag, 'fault_flag', qos.FLAG)
         self._fault_event = made.publisher(FaultEvent, 'fault_event', qos.EVENTS)
         self._isolation = made.publisher(Isolation, 'isolation', qos.FLAG)
@@ -146,7 +145,7 @@ class DetectorNode(MonitoringNode):
         take = self.entities.contained('estimate', source.hand)
         hear = self.entities.contained('isolation', self._hear)
         judged = self.entities.contained('estimate', self._judged_beside)
-        self._taker = Taker(take, hear, self, judged)
+        self._taker = Taker(take, hear, self, judged, self._samples.say)
         joint = self._joints.at(self.resolve_topic_name('estimate'))
         self.entities.on_release(joint.join(self._taker))
         self._outside = Outside(joint, self._taker, self.watch, source.subscribe)
@@ -208,7 +207,8 @@ class DetectorNode(MonitoringNode):
         self._settle()
         self.last, self.unread = stamp, True
         moved = tag != self._tag
-        if any(news) or moved or self._was_silent or self._samples.heard:
+        taker.speaks = self._samples.heard
+        if any(news) or moved or self._was_silent or taker.speaks:
             self._publish(tag, news.shown)
             if news.happened:
                 self._happened(tag)
@@ -216,7 +216,7 @@ class DetectorNode(MonitoringNode):
             self._signature.update(stamp, tag)
         if moved or self._strokes.under_way:
             self._strokes.follow(self._core.estimate, tag)
-        if self._was_silent or self._strokes.under_way or self._samples.heard:
+        if self._was_silent or self._strokes.under_way:
             taker.tell_each()
         else:
             taker.rest(self.watch.wall + ASKED_EVERY, tag, self._signature.told)

@@ -82,10 +82,11 @@ class EstimatorNode(MonitoringNode):
         self._encoder = EstimateEncoder()
         self._joint = self._joints.at(self.resolve_topic_name('estimate'))
         self._pair: tuple[Taker, Pair | None] | None = None
+        self._heard = False  # others listen to the estimates, when asked last
         self._last, self._phase = self._core.phase, -1
         self._refused_at = -math.inf  # monotonic time of the last refused sample [s]
         self._frozen = FrozenPosition()
-        self._publisher, self._listeners = made.publisher_on_request(
+        self._send, self._listeners = made.publisher_on_request(
             EstimateMessage, 'estimate', qos.SAMPLES
         )
         made.on_release(self._joint.enter())
@@ -121,6 +122,10 @@ class EstimatorNode(MonitoringNode):
                 ):  # as nearly always: there is nothing to tell
                     beside.last, beside.unread = sample.stamp, True
                     taker.ordinary += 1
+                    if self._heard:
+                        self._publish(sample.stamp, tag, taker)
+                    if taker.speaks:
+                        taker.say(tag)
                     return
                 estimate = self._judged_at_once(sample, tag, taker, news)
                 if estimate is None:
@@ -159,18 +164,22 @@ class EstimatorNode(MonitoringNode):
         core = self._core
         assert isinstance(core, Estimator)
         if news >= 0:
-            heard = self._listeners.count > taker.subscribed
-            if heard:
-                taker.sent(sample.stamp)
-                self._publisher.publish(self._encoder.encode(core.latest, tag))
+            self._heard = self._listeners.count > taker.subscribed
+            if self._heard:
+                self._publish(sample.stamp, tag, taker)
             bits = (HAPPENED, SHOWN, SIGNED)
             taker.judged(sample.stamp, tag, News(*(bool(news & bit) for bit in bits)))
-            if heard:
-                taker.tell_each()
             return None
         if news == ESTIMATED:
             return core.latest
         return core.note(REFUSED - news, sample.stamp, sample[1:], core.last_stamp)
+
+    def _publish(self, stamp: int, tag: str, taker: Taker) -> None:
+        """Publish the latest estimate, which the detector beside has judged."""
+        core = self._core
+        assert isinstance(core, Estimator)
+        taker.sent(stamp)
+        self._send(self._encoder.encode(core.latest, tag))
 
     def _give(self, estimate: Estimate, tag: str) -> None:
         """Hand an estimate to the detector beside, and publish it for whoever else listens."""
@@ -178,7 +187,7 @@ class EstimatorNode(MonitoringNode):
         if not takers or self._joint.heard(self._listeners.count):
             for taker in takers:
                 taker.sent(estimate.stamp)
-            self._publisher.publish(self._encoder.encode(estimate, tag))
+            self._send(self._encoder.encode(estimate, tag))
         self._joint.hand(estimate, tag)
 
     def _tell_judgement(self, tag: str) -> None:

@@ -53,6 +53,7 @@ class Taker:
     :param beside: the detector, where its estimates may be judged with the samples.
     :param judged: called after that, with stamp, tag and news; not for each sample of which there
         is nothing to tell.
+    :param say: called in its place, with the tag, where `speaks`.
     """
 
     watch: InputWatch  # of the estimator beside
@@ -63,8 +64,11 @@ class Taker:
         hear: Callable[[Judgement], None] = lambda judgement: None,
         beside: Beside | None = None,
         judged: Callable[[int, str, News], None] = lambda stamp, tag, news: None,
+        say: Callable[[str], None] = lambda tag: None,
     ) -> None:
         self.take, self.hear, self.beside, self.judged = take, hear, beside, judged
+        self.say = say
+        self.speaks = False  # somebody listens to what the detector publishes of each sample
         self.subscribed = False  # DDS brings it estimates too
         self._echoes: deque[int] = deque(maxlen=MOST_ECHOES)
         self.ordinary = 0  # samples that `judged` was not called for

@@ -101,17 +101,18 @@ class Entities:
 
     def publisher_on_request(
         self, kind: type, topic: str, profile: QoSProfile
-    ) -> tuple[Publisher, Listeners]:
+    ) -> tuple[Callable[[bytes], None], Listeners]:
         """
-        Make a publisher that is used while somebody subscribes.
+        Make a publisher of serialised messages that is used while somebody subscribes.
 
         :param kind: type of its messages.
         :param topic: its topic.
         :param profile: quality of service.
-        :return: the publisher, and how many listen to it.
+        :return: sends a message, and how many listen to it.
         """
         made = self.publisher(kind, topic, profile)
-        return made, Listeners(made)
+        send: Callable[[bytes], None] = made.handle.publish_raw  # type: ignore[attr-defined]
+        return send, Listeners(made)
 
     def subscription(
         self,
