@@ -9,13 +9,11 @@ from pathlib import Path
 from damadics_msgs.msg import Estimate as EstimateMessage
 from damadics_msgs.msg import FaultEvent, FaultFlag, Isolation
 
-from damadics_fd.causes import explain
 from damadics_fd.core.approximator.state import Estimate
 from damadics_fd.core.decision.detector import Detector, Outcome
 from damadics_fd.core.decision.events import Decision, Event
 from damadics_fd.core.judgement import Judgement, LiveJudgement
 from damadics_fd.core.modes import PHASE_INIT, PHASE_MONITOR
-from damadics_fd.core.text import SENTENCE, plain
 from damadics_fd.nodes.alarm_memory import AlarmMemory
 from damadics_fd.nodes.detector_report import report_of
 from damadics_fd.nodes.joint import Joints, News, Outside, Taker
@@ -26,14 +24,10 @@ from damadics_fd.nodes.second_publisher import RivalWatch
 from damadics_fd.nodes.signature_publisher import SignaturePublisher, read_causes
 from damadics_fd.ros import qos
 from damadics_fd.ros.arguments import check_node_arguments
-from damadics_fd.ros.conversions import (
-    event_message,
-    isolation_message,
-    read_judgement,
-    write_flag,
-)
+from damadics_fd.ros.conversions import hide, read_judgement, write_flag
 from damadics_fd.ros.diagnostics import Level, Report
 from damadics_fd.ros.entities import ASKED_EVERY
+from damadics_fd.ros.explained import explained_messages
 from damadics_fd.ros.judged_samples import JudgedSamples
 from damadics_fd.ros.spin import spin
 from damadics_fd.store.alarms import default_folder
@@ -264,12 +258,11 @@ class DetectorNode(MonitoringNode):
 
     def _tell(self, events: Iterable[Event], frame_id: str, more: str = '') -> None:
         for event in events:
-            explained = explain(event, self._causes, self.actuator)
-            message = event_message(explained, frame_id)
-            message.text = plain(message.text + more, SENTENCE)
-            self._fault_event.publish(message)
             own = bool(self._core.signature.state[0].own)
-            isolation = isolation_message(explained, frame_id, own)
+            message, isolation = explained_messages(
+                event, self._causes, self.actuator, frame_id, own, more
+            )
+            self._fault_event.publish(message)
             if isolation and self.settings.mode != 'scada':  # there the estimator tells it
                 self._isolation.publish(isolation)
         self._memory.keep()
@@ -308,9 +301,8 @@ class DetectorNode(MonitoringNode):
         flag = self._flag
         if self._decision is not None:
             write_flag(self._decision, flag)
-        if self._blind and flag.state != FaultFlag.STATE_UNKNOWN:
-            flag.state = FaultFlag.STATE_NOT_MONITORING
-            flag.level = flag.level or FaultFlag.NE107_FUNCTION_CHECK
+        if self._blind:
+            hide(flag)
         self._fault_flag.publish(flag)
         self._rival.sent()
 

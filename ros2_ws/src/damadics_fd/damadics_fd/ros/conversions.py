@@ -105,6 +105,17 @@ def write_flag(decision: Decision, message: FaultFlag) -> None:
     message.residual, message.threshold = decision.residual, decision.threshold
 
 
+def hide(message: FaultFlag) -> None:
+    """
+    Show a flag as not monitoring, because its judgement says nothing about now.
+
+    :param message: state and level are written, unless it says that the alarm's state was lost.
+    """
+    if message.state != FaultFlag.STATE_UNKNOWN:
+        message.state = FaultFlag.STATE_NOT_MONITORING
+        message.level = message.level or FaultFlag.NE107_FUNCTION_CHECK
+
+
 def event_message(event: Event, frame_id: str) -> FaultEvent:
     """
     Return the message of an event.

@@ -10,12 +10,11 @@ from damadics_msgs.msg import FaultFlag, FleetEvent, FleetIsolation, Isolation
 from numpy.typing import NDArray
 from rclpy.node import Node
 
-from damadics_fd.causes import CauseTable, explain
+from damadics_fd.causes import CauseTable
 from damadics_fd.core.approximator.state import Estimate
 from damadics_fd.core.decision.events import Decision, Event
 from damadics_fd.core.judgement import Judgement, LiveJudgement
 from damadics_fd.core.record import Floats
-from damadics_fd.core.text import SENTENCE, plain
 from damadics_fd.nodes.fleet.ages import Ages
 from damadics_fd.nodes.fleet.blocks import Rows
 from damadics_fd.nodes.fleet.exposed import Exposed
@@ -23,13 +22,9 @@ from damadics_fd.nodes.fleet.keeping import Keeping
 from damadics_fd.nodes.fleet.members import Happening, Members, Taken
 from damadics_fd.nodes.fleet.strokes import FleetStrokes
 from damadics_fd.ros import qos
-from damadics_fd.ros.conversions import (
-    event_message,
-    isolation_message,
-    judgement_message,
-    write_flag,
-)
+from damadics_fd.ros.conversions import hide, judgement_message, write_flag
 from damadics_fd.ros.entities import Entities
+from damadics_fd.ros.explained import explained_messages
 
 
 class Telling:
@@ -130,12 +125,9 @@ class Telling:
     def _tell_event(self, number: int, event: Event, remark: str = '') -> None:
         member = self._members.all[number]
         tag, place = member.actuator, member.namespace
-        explained = explain(event, self._causes, tag)
-        message = event_message(explained, tag)
-        message.text = plain(message.text + remark, SENTENCE)
+        own = bool(self._keeping.detector(number).signature.state[0].own)
+        message, isolation = explained_messages(event, self._causes, tag, tag, own, remark)
         self._event.publish(FleetEvent(valve=place, event=message))
-        signature = self._keeping.detector(number).signature.state[0]
-        isolation = isolation_message(explained, tag, bool(signature.own))
         if isolation and member.settings.mode != 'scada':
             self._tell_cause(number, isolation)
         if number in self._exposed:
@@ -209,9 +201,8 @@ class Telling:
         flag = FaultFlag()
         flag.header.frame_id = self._members.all[number].actuator
         write_flag(Decision(*bank.decisions[place].item()), flag)
-        if not age <= self._ages.limits[number] and flag.state != FaultFlag.STATE_UNKNOWN:
-            flag.state = FaultFlag.STATE_NOT_MONITORING
-            flag.level = flag.level or FaultFlag.NE107_FUNCTION_CHECK
+        if not age <= self._ages.limits[number]:
+            hide(flag)
         self._exposed[number].flag.publish(flag)
 
 
