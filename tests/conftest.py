@@ -22,6 +22,7 @@ from rclpy.qos import QoSProfile
 
 QUIET = 0.012  # s that the loop of `promised` takes on the machine that the times are promised on
 PATIENCE = 120.0  # s for what takes a second or two: a busy machine is no failure
+PYTEST = 'PYTEST_CURRENT_TEST'  # a page as a process takes it for a test of its own
 SERVERS = ('connect', 'page')  # folders whose tests start servers
 
 

@@ -9,7 +9,7 @@ import time
 
 import numpy as np
 import pytest
-from conftest import PATIENCE, free_port, promised
+from conftest import PATIENCE, PYTEST, free_port, promised
 from damadics_bringup.processes import (
     executable,
     parameters,
@@ -22,7 +22,6 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
 pytestmark = pytest.mark.ros
 PERIOD = 2_500_000  # ns
-PYTEST = 'PYTEST_CURRENT_TEST'  # the page takes it for a test of its own
 SPEAK_AT_ONCE = {'PYTHONUNBUFFERED': '1', 'RCUTILS_LOGGING_BUFFERED_STREAM': '0'}
 
 

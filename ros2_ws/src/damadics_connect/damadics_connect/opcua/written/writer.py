@@ -23,7 +23,7 @@ from damadics_connect.watch import Watch
 
 LOOK = 0.1  # s between two looks at what has changed
 NUMBERS = 1.0  # s between two updates of running numbers, and beats
-LAST_WORD = 1.0  # s for the last values when this process ends
+LAST_WORD = 5.0  # s for the last values when this process ends, on a busy machine too
 CURRENT_WRITE = 0x02  # of an access level
 BAD = 0x80000000
 
