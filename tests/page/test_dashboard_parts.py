@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The page without a browser: traces, honest decimation, words, access, history."""
 
+import math
 import re
 
 import numpy as np
@@ -28,6 +29,7 @@ from damadics_msgs.msg import (
     Float64Stamped,
     Isolation,
     Measurement,
+    Signature,
 )
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -313,3 +315,19 @@ def test_a_recording_that_is_not_judged_says_why(tmp_path, scale, said):
     (done,) = play(path, 'monitor')
     assert not done.monitored
     assert answer_words(done.status, 'de').startswith(said), done.status
+
+
+def test_a_size_that_became_known_after_the_event_is_told():
+    valve = Valve('lv101')
+    valve.take_flag(FaultFlag(state=FaultFlag.STATE_ALARM, level=1, occurrence=1), 100.0)
+    valve.take_event({**event(FaultEvent.CHANGED), 'cause': 'friction_up', 'strength': None})
+
+    def told(**values):
+        valve.signature = Signature(state=Signature.STATE_ALARM, **values)
+        return alarm_words(valve, valve.alarm(), texts('en'), name=False).headline
+
+    unknown = told(cause=Signature.CAUSE_FRICTION_UP, value=math.nan)
+    assert 'not known yet' in unknown
+    assert told(cause=Signature.CAUSE_SPRING_SOFTER, value=-0.2) == unknown, 'of another cause'
+    sized = told(cause=Signature.CAUSE_FRICTION_UP, value=1.65, std=0.1, confidence=0.99)
+    assert sized == 'Friction is 2.6 times normal.'

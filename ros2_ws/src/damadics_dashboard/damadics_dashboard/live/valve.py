@@ -25,6 +25,7 @@ from damadics_dashboard.live.judged import (
     Judged,
     judged_of,
 )
+from damadics_dashboard.live.late_size import late_size
 from damadics_dashboard.live.raw import Batch, batches
 from damadics_dashboard.live.traces import Trace
 from damadics_dashboard.live.unseen import Unseen
@@ -334,11 +335,10 @@ class Valve:
             if flag.threshold > 0.0:
                 now = flag.residual / flag.threshold
                 evidence['ratio'] = max(evidence.get('ratio') or 0.0, now)
-        if self.isolation is not None and self.isolation.occurrence == flag.occurrence:
-            evidence |= {
-                'found_by': self.isolation.found_by,
-                'deviation': self.isolation.deviation,
-            }
+        found = self.isolation
+        if found is not None and found.occurrence == flag.occurrence:
+            evidence |= {'found_by': found.found_by, 'deviation': found.deviation}
+        evidence |= late_size(evidence, self.signature)
         return Alarm(
             flag.occurrence,
             flag.level,
