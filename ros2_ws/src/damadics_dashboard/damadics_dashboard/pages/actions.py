@@ -73,8 +73,8 @@ class Dialog:
         self, t: Texts, key: str, act: Act, ask: Callable[[], Mapping[str, Asked]] = dict
     ) -> None:
         self._act = act
-        with ui.dialog() as self._dialog, ui.card().classes('ask') as card:
-            with_values(card, role='dialog', aria_label=t(key))
+        with ui.dialog() as self._dialog, ui.card().classes('ask'):
+            with_values(self._dialog, aria_label=t(key))
             ui.label(t(key)).classes('ask-title')
             ui.label(t(f'{key}_explained')).classes('sub')
             self._asked = ask()
@@ -180,5 +180,5 @@ def valve_buttons(watcher: Watcher, valve: Valve, t: Texts) -> ui.menu:
         opener.props('icon-right=expand_more')
         with ui.menu() as menu:
             for key, act in choices:
-                ui.menu_item(t(key), on_click=act)
+                with_values(ui.menu_item(t(key), on_click=act), role='menuitem')
     return menu

@@ -12,7 +12,10 @@
   const state = () => (performance.now() - heard > LOST ? 'lost' : (ros ? 'good' : 'off'));
 
   function duration(seconds) {
-    if (seconds < 9.95) return `${seconds.toFixed(1)} s`;
+    if (seconds < 9.95) {
+      const number = seconds.toFixed(1);
+      return `${document.documentElement.lang === 'de' ? number.replace('.', ',') : number} s`;
+    }
     if (seconds < 59.5) return `${Math.round(seconds)} s`;
     const s = Math.round(seconds);
     if (s < 3600) return `${Math.floor(s / 60)} min ${s % 60} s`;

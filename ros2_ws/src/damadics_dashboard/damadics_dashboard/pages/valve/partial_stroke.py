@@ -33,6 +33,7 @@ class StrokeItem:
         with ui.menu_item(on_click=self._ask) as self._item, ui.item_section():
             self._name = ui.item_label(t(SERVICE))
             self._why = ui.item_label('').classes('why-not').props('caption')
+        with_values(self._item, role='menuitem')
         self.update()
 
     def update(self) -> None:
