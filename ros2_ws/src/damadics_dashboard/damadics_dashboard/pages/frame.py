@@ -22,7 +22,7 @@ FAVICON = (
     '<path d="M3 13v11l11-5.5L25 24V13l-11 5.5z"/><path d="M14 18V9"/>'
     '<path d="M7 9a7 6 0 0 1 14 0z" fill="#0a64bd" fill-opacity=".18"/></svg>'
 )
-VERSION = 13  # of the static files, for the caches of browsers
+VERSION = 14  # of the static files, for the caches of browsers
 PAGES = (('/', 'fleet'), ('/history', 'history'), ('/replay', 'replay'))
 BEAT = 0.25  # s between two signs of life
 NEXT_THEME = {None: True, True: False, False: None}
