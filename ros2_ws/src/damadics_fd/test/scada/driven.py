@@ -105,6 +105,22 @@ def late(cv: np.ndarray, seed: int, lag: float = 1.2, play: float = 0.006) -> np
     return rows
 
 
+def sticking(cv: np.ndarray, seed: int, stick: float) -> np.ndarray:
+    """Return rows of a stem that friction holds until its positioner is off by `stick`."""
+    rng = np.random.default_rng(seed)
+    x = np.empty(len(cv))
+    at, held = cv[0], cv[0]
+    for k, command in enumerate(cv.tolist()):
+        at += 0.5 * (command - at)
+        if abs(at - held) > stick:  # it slips, and stops before it is there
+            held = at - math.copysign(0.4 * stick, at - held)
+        x[k] = held
+    rows = np.full((len(cv), 7), np.nan)
+    rows[:, 0], rows[:, 1] = np.arange(float(len(cv))), cv
+    rows[:, 2] = x + rng.normal(0.0, NOISE, len(cv))
+    return rows
+
+
 def wandering(n: int, seed: int) -> np.ndarray:
     """Return a command that wanders slowly and never jumps."""
     rng = np.random.default_rng(seed)

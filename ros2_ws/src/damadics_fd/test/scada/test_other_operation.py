@@ -13,7 +13,7 @@ from damadics_fd.core.scada.learning import learn
 from damadics_fd.core.scada.monitor import ScadaMonitor
 from damadics_fd.core.scada.state import MONITOR, REFERENCE
 
-from .driven import NOISE, SETTINGS, driven, following, late, wandering
+from .driven import NOISE, SETTINGS, driven, following, late, sticking, wandering
 
 T, CV, X, P1, P2, T1, F = range(7)
 FALL = 0.04  # of the stroke a second
@@ -134,6 +134,29 @@ def test_a_stem_that_rests_within_its_play_is_no_fault_and_one_beside_it_is():
     rows[3000:, X] += 0.04
     trace = ScadaMonitor(SETTINGS, reference).run_samples(rows)
     assert 3000 <= trace['t'][trace['alarm']][0] <= 3060
+
+
+@pytest.mark.parametrize('stick', [0.012, 0.024, 0.04])
+def test_a_stem_that_sticks_from_the_first_day_is_stepped_without_an_alarm(stick):
+    reference = learn(sticking(wandering(1800, 1), 1, stick), SETTINGS, math.inf)
+    steps = np.repeat(np.random.default_rng(2).uniform(0.3, 0.7, 24), 300)
+    rows = sticking(steps + 0.3 * (wandering(len(steps), 3) - 0.5), 2, stick)
+    trace = ScadaMonitor(SETTINGS, reference).run_samples(rows)
+    assert not trace['alarm'].any(), trace['t'][trace['alarm']][:1]
+    sensor = rows.copy()
+    sensor[3450:, X] *= 1.3125
+    stuck = rows.copy()
+    stuck[2990:, X] = stuck[2990, X]  # until the next but one step at the latest
+    for faulty, since, until in ((sensor, 3450, 3455), (stuck, 2990, 3620)):
+        trace = ScadaMonitor(SETTINGS, reference).run_samples(faulty)
+        assert since <= trace['t'][trace['alarm']][0] <= until
+
+
+def test_a_step_at_the_end_of_the_record_tells_neither_gain_nor_lag():
+    cv = 0.4 + 0.2 * (np.arange(1200) >= 1188)
+    reference = learn(sticking(cv, 1, 0.012), SETTINGS, math.inf)
+    assert reference['stem_law']['gain'][0] == pytest.approx(1.0, abs=0.1)
+    assert reference['stem_law']['stick'][0] >= 0.012
 
 
 def test_a_record_that_stood_still_goes_on_elsewhere():

@@ -68,9 +68,10 @@ def residuals(
     xm = s.xm[0]
     if ref.stem_kind == LAW:
         raw = outside(x - s.drift[0], xm, s.xs, s.xq)
-        follow_drift(s, ref, 0, x - xm, STEM_DRIFT, 2.0 * ref.s1, STEM_DRIFT_S)
+        stick = ref.stem_law.stick
+        follow_drift(s, ref, 0, shrink(x - xm, stick), STEM_DRIFT, 2.0 * ref.s1, STEM_DRIFT_S)
         doubt = DOUBT * stem_doubt(ref.stem_law, xm) + DOUBT * STEM_HOURS * hours_unseen(ref)
-        doubt += transient_doubt(s.track, ref.stem_law)
+        doubt += stick + transient_doubt(s.track, ref.stem_law)
         beyond = max(ref.low[X] - xm, xm - ref.high[X], 0.0)
         doubt += (abs(ref.stem_law.gain - 1.0) + BENT) * beyond
         s.lasting = DOUBT * STEM_LASTING * hours_unseen(ref)

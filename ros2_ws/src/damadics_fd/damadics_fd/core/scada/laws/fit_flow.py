@@ -26,6 +26,8 @@ LEAST_FLOW = 0.02  # of the meter's range; below it meters do not measure
 BETTER = 0.9
 METER = 0.002  # of the range: the least noise of a flow meter
 AVERAGED = 5  # samples
+MOVING = 0.01  # of the stroke between position and its longest lag: there a lag shows
+FEWEST_MOVING = 30  # samples
 
 
 @dataclass(frozen=True)
@@ -122,7 +124,12 @@ def fit_flow(
     good &= x < 1.0 - 0.5 * STEP
     if good.sum() < 100:
         return None
-    fits = [_fit(t, x, model_x, size, flow, good, lag) for lag in LAGS]
+    moving = np.abs(x - smooth(x, t, LAGS[-1]))[good] > MOVING
+    seen = np.count_nonzero(moving) >= FEWEST_MOVING
+    if not seen:
+        moving[:] = True
+    lags = LAGS if seen else LAGS[:1]
+    fits = [_fit(t, x, model_x, size, flow, good, moving, lag) for lag in lags]
     shown = _lag_shown([fit[0] for fit in fits])
     _, c, v, left, spread = fits[shown]
     law = np.zeros(1, FLOW_LAW)
@@ -151,9 +158,20 @@ def _lag_shown(errors: list[float]) -> int:
 
 
 def _fit(
-    t: Floats, x: Floats, model_x: Floats, size: Floats, flow: Floats, good: np.ndarray, lag: float
+    t: Floats,
+    x: Floats,
+    model_x: Floats,
+    size: Floats,
+    flow: Floats,
+    good: np.ndarray,
+    moving: np.ndarray,
+    lag: float,
 ) -> tuple[float, Floats, Floats, Floats, float]:
-    """Return robust spread, knots, their covariance and the residual for one lag of the meter."""
+    """
+    Return the error where the stem moves, and all else for one lag of the meter.
+
+    :return: that robust error, knots, their covariance, the residual, its robust spread.
+    """
     a = hats(smooth(x, t, lag))[good]
     z = hats(smooth(model_x, t, lag))[good]
     y = np.log(flow[good]) - smooth(np.where(np.isfinite(size), size, np.nan), t, lag)[good]
@@ -178,8 +196,8 @@ def _fit(
     c = c + np.nanmedian(full)
     full -= np.nanmedian(full)
     # a lag also averages noise, which must not count for it: compare what is slower
-    slow = np.convolve(full[good], np.ones(AVERAGED) / AVERAGED, 'valid')
-    return spread_of(slow), c, v, full, spread
+    slow = np.convolve(full[good], np.ones(AVERAGED) / AVERAGED, 'same')
+    return 1.4826 * float(np.median(np.abs(slow[moving]))), c, v, full, spread
 
 
 def _white(flow: Floats) -> float:

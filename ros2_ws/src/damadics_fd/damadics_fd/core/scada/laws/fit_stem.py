@@ -17,8 +17,10 @@ from damadics_fd.core.scada.laws.stem_law import (
     TRANSIENT,
     follow_record,
 )
+from damadics_fd.core.scada.laws.stick import stick_of
 
 GAIN_SPREAD = 0.03  # a positioner moves the stem by what CV asks, within this
+LARGEST, UNKNOWN = 3.0, 0.1  # of its spread, where the gain has this standard error
 OFFSET_SPREAD = 0.05
 SLOWEST = 1.0 / 120.0  # stroke/s: a positioner that passes no more air than this is rare
 TRANSIENT_ROOM = 1.2
@@ -213,6 +215,8 @@ def _finish(law: np.ndarray, pieces: Sequence[Piece], x: Floats) -> StemFit:
     arrived = _arrived_error(u, weight * (track[:, COPIES] < ARRIVED), variance)
     prior = np.diag([1.0 / OFFSET_SPREAD**2, 1.0 / GAIN_SPREAD**2]) * variance
     theta = np.linalg.solve(sums + prior, design.T @ (weight * target))
+    if arrived > UNKNOWN:  # a stem on its way does not show its gain
+        theta[1] = np.clip(theta[1], -LARGEST * GAIN_SPREAD, LARGEST * GAIN_SPREAD)
     covariance = np.linalg.inv(sums + prior) * variance
     law['gain'] = 1.0 + theta[1]
     law['offset'] = theta[0] - theta[1] * centre
@@ -225,6 +229,8 @@ def _finish(law: np.ndarray, pieces: Sequence[Piece], x: Floats) -> StemFit:
     cv = np.concatenate([piece.cv for piece in pieces])
     way = np.maximum(track[:, COPIES], np.abs(cv - u))
     law['farthest'] = np.sort(way)[-max(3, len(way) // 1000)]
+    command = law['offset'] + law['gain'] * cv
+    law['stick'] = stick_of(x, command, position[:, 0], float(law['band'][0]))
     return StemFit(law, position, left, spread_of(left), 1.0 + float(free[1]), error, arrived)
 
 

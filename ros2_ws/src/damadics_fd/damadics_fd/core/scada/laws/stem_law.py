@@ -40,6 +40,7 @@ class StemLaw(Record):
     transient: float  # doubt while it moves, share of the way still to go
     farthest: float  # longest way to go in the record
     band: float  # dead band, share of stroke
+    stick: float  # how far off friction holds it at rest; 0: it does not
     gain: float
     offset: float
     centre: float  # mean position learned at
@@ -121,10 +122,16 @@ def advance_track(s: StemTrack, law: StemLaw, t: float, cv: float) -> None:
 
 @jit
 def allow_haste(s: StemTrack, law: StemLaw, command: float) -> None:
-    """Put the quick copy where CV is while the way there is longer than any in the record."""
+    """
+    Put the quick copy where CV is while the way there is longer than any in the record.
+
+    Always, where the stem sticks: that looks like a lag, but a stem that slips is at CV at once.
+    """
     way = abs(command - s.lagged[0])
-    if way > law.farthest:  # small motion does not show how a large one is delayed
+    far = way > law.farthest
+    if far:  # small motion does not show how a large one is delayed
         s.was_ahead = max(s.was_ahead, way)
+    if far or law.stick > 0.0:
         s.lagged[2] = command
         s.held[2] = command
 
