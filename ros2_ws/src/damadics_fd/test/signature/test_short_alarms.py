@@ -186,6 +186,12 @@ def test_small_named_changes_are_not_material(learned):
     assert not material(s, c, False), 'friction by 10 %'
     s.now[:] = (0.03, 0.0, 0.1)
     assert material(s, c, False), 'and the spring by 3 %'
+    for cause in (st.CAUSE_FRICTION_UP, st.CAUSE_SPRING_SOFTER):
+        s.cause, s.cause_value = cause, math.nan
+        s.now[:] = (0.0, 0.0, 0.1)
+        assert not material(s, c, False), 'nor is one whose size is withheld, while it is small'
+        s.now[:] = (0.0, 0.0, 0.9)
+        assert material(s, c, False)
 
 
 def test_a_clock_that_is_set_back_ends_no_alarm(learned):

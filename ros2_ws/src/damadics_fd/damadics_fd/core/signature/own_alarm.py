@@ -205,7 +205,7 @@ def persists(s: State, c: SignatureSettings) -> bool:
 @jit
 def joint_material(s: State, c: SignatureSettings, share: float) -> bool:
     """
-    Tell whether a change without a name matters, by spring, preload and friction together.
+    Tell whether a change without name or size matters, by spring, preload and friction together.
 
     Temperature changes several at once, so that none of them explains the evidence alone.
 
@@ -230,18 +230,21 @@ def material(s: State, c: SignatureSettings, before: bool) -> bool:
     :param c: settings record.
     :param before: whether it mattered before; a change about the limit does not chatter.
     :return: False for a named friction or spring change that is certainly small, and of the own
-        alarm until the size is known.
+        alarm until the size, or what stands for one that is withheld, is known.
     """
     share = HYSTERESIS if before else 1.0
     if s.own != 0 and s.cause in (CAUSE_UNDETERMINED, CAUSE_UNCONFIRMED):
         return joint_material(s, c, share)
+    spring = s.second if s.cause == CAUSE_ELASTIC else s.cause
+    is_spring = spring in (CAUSE_SPRING_STIFFER, CAUSE_SPRING_SOFTER)
+    is_friction = s.cause in (CAUSE_FRICTION_UP, CAUSE_FRICTION_DOWN)
     if math.isnan(s.cause_value):
-        return True
-    if s.cause in (CAUSE_FRICTION_UP, CAUSE_FRICTION_DOWN):
+        withheld = s.own != 0 and (is_friction or is_spring)
+        return joint_material(s, c, share) if withheld else True
+    if is_friction:
         most = at_most(s.cause_value, s.cause_std, MODEL_FRICTION)
         return bool(most >= share * c.material_friction)
-    spring = s.second if s.cause == CAUSE_ELASTIC else s.cause
-    if spring in (CAUSE_SPRING_STIFFER, CAUSE_SPRING_SOFTER):
+    if is_spring:
         most = at_most(s.cause_value, s.cause_std, MODEL_SPRING)
         return bool(most >= share * c.material_spring)
     return True
