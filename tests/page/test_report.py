@@ -11,12 +11,13 @@ import time
 from datetime import datetime
 
 import pytest
+from damadics_dashboard.live.late_size import SizeKeeper
 from damadics_dashboard.report.command import main
-from damadics_dashboard.report.content import alarms_of, reliability
+from damadics_dashboard.report.content import Sources, alarms_of, known_for, reliability
 from damadics_dashboard.report.forms import numeric_columns
 from damadics_dashboard.store.history import History
 from damadics_fd.store.intervals import DAY, Intervals
-from damadics_msgs.msg import FaultEvent
+from damadics_msgs.msg import FaultEvent, Signature
 
 pypdf = pytest.importorskip('pypdf')
 END = 1_790_000_000.0  # s
@@ -171,6 +172,37 @@ def test_german(year, tmp_path):
 def test_what_cannot_be_is_refused_with_a_remedy(year, tmp_path, words, said, capsys):
     assert main(['--state', str(year), '--out', str(tmp_path), *words]) == 2
     assert said in capsys.readouterr().err
+
+
+def test_a_valve_known_for_minutes_has_no_time_between_alarms_of_weeks(tmp_path):
+    trends, history = Intervals(tmp_path / 'trends.sqlite'), History(tmp_path / 'history.sqlite')
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(time, 'time', lambda: END - 1200.0)
+        history.add(event('lv101', END - 1200.0, FaultEvent.RAISED))
+    trends.add('lv101', END - 1800.0, {'friction': 0.1}, {}, '')
+    found = known_for(Sources(history, trends), 'lv101', END - 30 * DAY, END)
+    assert 1800.0 <= found < 1800.0 + 900.0
+    assert known_for(Sources(history, trends), 'lv101', END - 60.0, END) == 60.0
+    assert known_for(Sources(history, trends), 'lv999', END - 60.0, END) == 0.0
+    trends.close()
+    history.close()
+
+
+def test_a_size_that_becomes_known_after_its_event_is_in_the_report(tmp_path):
+    told = event('lv101', END, FaultEvent.CHANGED, cause='friction_up')
+    signature = Signature(state=Signature.STATE_ALARM, cause=Signature.CAUSE_FRICTION_UP)
+    history = History(tmp_path / 'history.sqlite')
+    keeper = SizeKeeper(history)
+    signature.value = 1.65
+    keeper.keep([told], signature)  # the event is not in the file yet
+    history.add(told)
+    signature.value = math.nan
+    keeper.keep([told], signature)
+    assert history.latest()[0]['strength'] is None
+    for signature.value in (1.65, 1.70):
+        keeper.keep([told], signature)
+    assert history.latest()[0]['strength'] == 1.65, 'what was known first stays'
+    history.close()
 
 
 def test_times_between_and_to_clearing():

@@ -14,6 +14,7 @@ from pathlib import Path
 from damadics_fd.core.settings import Settings
 from damadics_fd.figures.panels import six_panels
 from damadics_fd.store.references import ReferenceFileError, load_reference
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
@@ -189,12 +190,13 @@ def _progress(console: Console) -> Progress:
 
 
 def _table(outcomes: list[Outcome]) -> Table:
-    table = Table(title='Instants of detection in s', title_justify='left')
-    for heading in ('start', 'experiment'):
-        table.add_column(heading)
-    for heading in ('paper', 'over the threshold', 'flag, live', 'flag, from the bag'):
-        table.add_column(heading, justify='right')
-    table.add_column('decisions before the fault')
+    table = Table(title='Instants of detection in s', title_justify='left', box=SIMPLE_HEAD)
+    numbers = ('paper', 'over the threshold', 'flag, live', 'flag, from the bag')
+    for heading in ('start', 'experiment', *numbers, 'decisions before the fault'):
+        whole = max(map(len, heading.split()))  # no word is cut in a narrow terminal
+        table.add_column(
+            heading, justify='right' if heading in numbers else 'left', min_width=whole
+        )
     for outcome in outcomes:
         _add_row(table, 'learned', outcome, outcome.live, outcome.offline, outcome.agrees)
     table.add_section()

@@ -32,6 +32,7 @@ from rclpy.subscription import Subscription
 
 from damadics_dashboard.live.calls import Calls, Field, Service, ServiceError
 from damadics_dashboard.live.fleet import SERVICES, FleetReport, shared
+from damadics_dashboard.live.late_size import SizeKeeper
 from damadics_dashboard.live.overview import Overview
 from damadics_dashboard.live.record import action_row, event_row
 from damadics_dashboard.live.trend_points import TrendPoints
@@ -256,6 +257,7 @@ class Watcher:
         if (name, 'fault_flag') in self._subscriptions:
             return
         valve = self._valve(name)
+        sizes = SizeKeeper(self.history)
 
         def take_flag(message: FaultFlag) -> None:
             valve.take_flag(message, time.monotonic())
@@ -268,6 +270,7 @@ class Watcher:
 
         def take_signature(message: Signature) -> None:
             valve.signature = message
+            sizes.keep(valve.events, message)
 
         def take_isolation(message: Isolation) -> None:
             valve.isolation = message

@@ -102,19 +102,33 @@ def alarms_of(events: list[EventRow]) -> list[Alarm]:
     return found
 
 
-def reliability(alarms: list[Alarm], span: float, valves: int = 1) -> tuple[float, float]:
+def known_for(sources: Sources, valve: str, since: float, until: float) -> float:
+    """
+    Return for how much of a period a valve has been known.
+
+    :param sources: history and trends.
+    :param valve: its name.
+    :param since: begin of the period [s].
+    :param until: its end [s].
+    :return: [s]; a valve of which nothing is known has no alarm either.
+    """
+    first, _ = sources.intervals.span(valve) or (math.inf, math.inf)
+    first = min(first, sources.history.first_seen(valve))
+    return max(until - max(since, first), 0.0)
+
+
+def reliability(alarms: list[Alarm], span: float) -> tuple[float, float]:
     """
     Return mean time between failures and mean time to repair.
 
     :param alarms: of all valves.
-    :param span: period that was looked at [s].
-    :param valves: how many.
+    :param span: for which they have been known, all together [s].
     :return: MTBF and MTTR [s]; inf and NaN without an alarm.
     """
     repaired = [a.cleared - a.raised for a in alarms if math.isfinite(a.cleared)]
     mttr = sum(repaired) / len(repaired) if repaired else math.nan
     down = sum(repaired)
-    mtbf = (span * valves - down) / len(alarms) if alarms else math.inf
+    mtbf = max(span - down, 0.0) / len(alarms) if alarms else math.inf
     return mtbf, mttr
 
 
@@ -133,7 +147,7 @@ def valve_report(sources: Sources, valve: str, since: float, until: float, t: Te
     events = sources.history.find(wanted, MOST_EVENTS)
     actions = sources.history.actions(wanted, MOST_EVENTS)
     alarms = alarms_of(events)
-    mtbf, mttr = reliability(alarms, until - since)
+    mtbf, mttr = reliability(alarms, known_for(sources, valve, since, until))
     last = alarms[-1] if alarms else None
     summary = [t('report_quiet')]
     if last is not None:
@@ -202,19 +216,22 @@ def fleet_report(sources: Sources, since: float, until: float, t: Texts) -> Repo
     rows: list[tuple[int, int, list[str]]] = []
     alarms: list[Alarm] = []
     everything: list[EventRow] = []
+    together = 0.0
     for valve in valves:
         events = sources.history.find(Wanted(valve=valve, since=since, until=until), MOST_EVENTS)
         everything += events
         mine = alarms_of(events)
         alarms += mine
-        mtbf, mttr = reliability(mine, until - since)
+        known = known_for(sources, valve, since, until)
+        together += known
+        mtbf, mttr = reliability(mine, known)
         what = headline(mine[-1].last, t)[0] if mine else t('report_quiet')
         worst = max((a.level for a in mine), default=0)
         name = f'{valve or "valve"} {sources.tag(valve)}'.strip()
         row = [name, str(len(mine)), t.duration(mtbf), t.duration(mttr), what]
         rows.append((worst, len(mine), row))
     rows.sort(key=lambda r: (-r[0], -r[1], r[2][0]))
-    mtbf, mttr = reliability(alarms, until - since, max(len(valves), 1))
+    mtbf, mttr = reliability(alarms, together)
     days = max((until - since) / DAY, 1e-9)
     a_day = len(alarms) / days
     verdict = 'eemua_good' if a_day <= MANAGEABLE else 'eemua_limit'

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The history: every transition of every valve and everything that people did, over restarts."""
 
+import math
 import sqlite3
 import threading
 import time
@@ -118,6 +119,38 @@ class History:
             return False
         self._write('event', {'unseen': None, **event, 'seen': time.time()})
         return True
+
+    def complete(self, event: EventRow) -> bool:
+        """
+        Add size and confidence to an event that was stored without them.
+
+        :param event: with them.
+        :return: False where the file has no such event, or cannot be written.
+        """
+        where = 'valve = :valve AND stamp = :stamp AND transition = :transition'
+        try:
+            with self._lock, self._db:
+                done = self._db.execute(
+                    'UPDATE event SET strength = :strength, confidence = :confidence '
+                    f'WHERE {where} AND occurrence = :occurrence AND strength IS NULL',
+                    event,
+                )
+        except sqlite3.Error as problem:
+            self.problem = f'not written, tried again every second: {problem}'
+            return False
+        return done.rowcount > 0
+
+    def first_seen(self, valve: str) -> float:
+        """
+        Return since when there is a history of a valve.
+
+        :param valve: its name.
+        :return: time of its first event [s]; inf where there is none.
+        """
+        query = 'SELECT min(seen) FROM event WHERE valve = ?'
+        with self._lock:
+            (first,) = self._db.execute(query, (valve,)).fetchone()
+        return float(first) if isinstance(first, (int, float)) else math.inf
 
     def add_action(self, action: ActionRow, stamp: int | None = None) -> bool:
         """

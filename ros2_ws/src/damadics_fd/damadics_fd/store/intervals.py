@@ -153,16 +153,19 @@ class Intervals:
         """
         first: float | None = None
         last: float | None = None
+        longer = math.inf
         with self._lock:
-            for level in LEVELS:
+            for level in reversed(LEVELS):
                 row = self._db.execute(
                     f'SELECT min(start), max(start) FROM point_{level} '
                     f'JOIN valve ON valve.id = point_{level}.valve WHERE valve.name = ?',
                     (valve,),
                 ).fetchone()
                 if row[0] is not None:
-                    first = row[0] if first is None else min(first, row[0])
+                    # shorter intervals tell it better, but are not kept as long
+                    first = row[0] if first is None or row[0] < first + longer else first
                     last = row[1] if last is None else max(last, row[1])
+                    longer = level
         return None if first is None or last is None else (float(first), float(last))
 
     def forget(self, now: float) -> None:
