@@ -260,7 +260,7 @@ def _table_problem(item: 'Field[Value]', value: Value) -> str:
         return f'{item.name} = {value!r} is not a list of numbers'
     try:
         numbers = [float(v) for v in value]
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         return f'{item.name} = {value!r} is not a list of numbers'
     if len(numbers) != length or not all(low <= v <= high for v in numbers):
         return f'{item.name} needs {length} numbers in {low:g}..{high:g}'

@@ -66,6 +66,12 @@ def test_what_is_refused_is_refused_in_files_too_and_all_at_once():
     assert [text.split(':')[0] for text in error.value.problems] == ['nonsense', 'k2', 'alpha1']
 
 
+@pytest.mark.parametrize('given', [{'plug_table': [10**400] * 12}, {'mass': 10**400}])
+def test_a_whole_number_beyond_any_float_is_refused_by_name(given):
+    with pytest.raises(SettingsError, match=next(iter(given))):
+        Settings.for_mode('monitor', **given)
+
+
 @pytest.mark.parametrize('mode', MODES)
 def test_settings_come_back_from_plain_data(mode):
     settings = Settings.for_mode(mode, mass=3, plug_table=[1] * 12)
