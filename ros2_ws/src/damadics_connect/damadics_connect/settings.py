@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Read a configuration file; every mistake in it is told at once, and no secret is shown."""
 
+import math
 import os
 from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
@@ -102,10 +103,14 @@ class Section:
         if isinstance(value, bool) or not isinstance(value, int | float):
             self.refuse(name, f'is not a number from {low:g} to {high:g}')
             return default
-        if not low <= value <= high:
-            self.refuse(name, f'{value:g} is not within {low:g} .. {high:g}')
+        try:
+            number = float(value)
+        except OverflowError:
+            number = math.inf if value > 0 else -math.inf
+        if not low <= number <= high:
+            self.refuse(name, f'{number:g} is not within {low:g} .. {high:g}')
             return default
-        return float(value)
+        return number
 
     def flag(self, name: str, default: bool = False) -> bool:
         """Read true or false."""

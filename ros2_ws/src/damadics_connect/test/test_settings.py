@@ -8,7 +8,7 @@ import sys
 from importlib import import_module
 
 import pytest
-from damadics_connect.settings import ConfigError, read_config
+from damadics_connect.settings import ConfigError, Section, read_config
 
 
 @pytest.mark.parametrize(
@@ -110,3 +110,12 @@ def test_a_connector_loads_no_compiler():
         check=True,
     )
     assert not {'numba', 'scipy'} & set(told.stdout.split())
+
+
+@pytest.mark.parametrize(
+    ('value', 'shown'), [(10**400, 'inf'), (-(10**400), '-inf')], ids=['above', 'below']
+)
+def test_a_whole_number_beyond_any_float_is_refused(value, shown):
+    problems: list[str] = []
+    assert Section({'port': value}, '', problems).number('port', 80, 1, 65535) == 80
+    assert f'{shown} is not within 1 .. 65535' in problems[0]

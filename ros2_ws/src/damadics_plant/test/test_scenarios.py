@@ -88,6 +88,8 @@ random: {<<: *base, cv: {random_steps: {low: 0.2, high: 0.4, seed: 3}}}
         ('a: {cv: 1}', 'duration: is missing'),
         ('a: {duration: ten}', "duration: 'ten' is no number"),
         ('a: {duration: -1}', 'not within 0'),
+        (f'a: {{duration: 1{"0" * 400}}}', '0 is no number'),
+        ('a: {duration: 1, faults: [{fault: f1, direction: .inf}]}', r'faults\[0\]'),
         ('a: {duration: 1, cv: {square: 1}}', 'steps, sine, random_steps, recorded, level_loop'),
         ('a: {duration: 1, cv: {steps: [[0, 1], [0, 2]]}}', 'times must increase'),
         ('a: {duration: 1, cv: {steps: 1}}', r'wants a list of \[time in s, value\]'),

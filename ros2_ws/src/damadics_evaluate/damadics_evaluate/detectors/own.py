@@ -112,7 +112,7 @@ class Own(Detector):
             try:
                 score, limit = answer
                 values[i] = float(score) / max(float(limit), TINY)
-            except (TypeError, ValueError) as error:
+            except (TypeError, ValueError, OverflowError) as error:
                 raise RefusedError(
                     f'{self.name}: update() returned {answer!r}, not (score, limit)'
                 ) from error
@@ -121,7 +121,7 @@ class Own(Detector):
     def _checked(self, found: object, samples: int) -> Floats:
         try:
             values = np.asarray(found, dtype=np.float64)
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, OverflowError) as error:
             raise RefusedError(
                 f'{self.name} returns {type(found).__name__}, no numbers'
             ) from error

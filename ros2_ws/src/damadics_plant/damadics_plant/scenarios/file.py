@@ -81,7 +81,7 @@ class _Reader:
             if isinstance(value, bool) or not isinstance(value, int | float | str):
                 raise ValueError
             number = float(value)  # PyYAML reads 3.5e6 as a string
-        except ValueError:
+        except (ValueError, OverflowError):
             self.wrong(key, f'{value!r} is no number')
             return math.nan
         if not low <= number <= high:
@@ -130,7 +130,7 @@ class _Reader:
             return None
         try:
             return Fault(entry['fault'], direction=int(direction), **values)
-        except ValueError as error:
+        except (ValueError, OverflowError) as error:
             self.wrong(key, str(error))
             return None
 
