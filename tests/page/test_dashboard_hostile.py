@@ -257,6 +257,17 @@ def test_partial_strokes_are_asked_for_where_the_detector_allows_them(site, brow
     page.close()
 
 
+def test_a_valve_that_learns_is_not_held_against_its_limit(site, browser):
+    site.voices.flag('novice', FaultFlag.STATE_LEARNING, 'LV-8', residual=20.0, threshold=0.2)
+    page = website.new_page(browser)
+    page.goto(f'{site.address}/valve/novice')
+    page.wait_for_selector('.banner[data-kind=learn]')
+    assert 'limit' not in page.locator('.banner').inner_text()
+    site.voices.flag('novice', FaultFlag.STATE_HEALTHY, 'LV-8', residual=0.1, threshold=0.2)
+    page.wait_for_selector('.banner[data-kind=ok] >> text=50 % of limit')
+    page.close()
+
+
 @pytest.mark.parametrize('scheme', ['light', 'dark'])
 def test_axe_finds_nothing_serious_on_any_page(site, hostile, browser, scheme):
     for state in STATES:

@@ -231,10 +231,10 @@ class _Page:
             what, _, _ = headline(alarm.evidence, t)
             told = t('alarm_is', what=t('state_lost') if alarm.state == 'unknown' else what)
         ratio, monitored = max(valve.ratio, 0.0), condition.kind != 'off'
+        learns = condition.kind == 'learn'
+        judged = monitored and not learns  # a limit that is still learned means nothing
         heard = monitored or valve.period > 0.0
-        learned = heard and (
-            valve.progress > 0.0 or condition.kind == 'learn'
-        )  # else not told yet
+        learned = heard and (valve.progress > 0.0 or learns)  # else not told yet
         rate = f'{1.0 / valve.period:.0f}' if valve.period > 0.0 else DASH
         return {
             'kind': condition.kind,
@@ -244,8 +244,8 @@ class _Page:
             'figures': [
                 _figure(
                     t('residual'),
-                    of_limit(ratio, t) if monitored else DASH,
-                    share=ratio if monitored else None,
+                    of_limit(ratio, t) if judged else DASH,
+                    share=ratio if judged else None,
                 ),
                 _figure(t('last_sample'), '–', t('ago'), aging=True),
                 _figure(t('samples'), rate, 'Hz' if valve.period > 0.0 else ''),
