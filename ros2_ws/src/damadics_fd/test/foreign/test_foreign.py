@@ -12,9 +12,9 @@ from damadics_fd.commands.commission.twin.constants import twin
 from damadics_fd.core.monitor import run
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.settings.identified import FaultFree
-from damadics_plant import Scenario, simulate
+from damadics_plant import Fault, Scenario, simulate
 from damadics_plant.actuator.twin import twin_of
-from damadics_plant.scenarios.sources import Recorded
+from damadics_plant.scenarios.sources import RandomSteps, Recorded
 
 from . import courses, kinds
 from . import valve as foreign
@@ -193,6 +193,26 @@ def test_a_lag_of_the_pressure_is_no_hysteresis_of_the_diaphragm(lag):
     t = trial(build, proposal, 'friction +100 %', 7501, quiet=300.0)
     assert t.size == pytest.approx(1.0, rel=0.15)
     assert abs(t.size - t.true) < 2.0 * t.std
+
+
+@pytest.mark.parametrize('noise', [1e-4, 5e-4])
+def test_bristles_that_give_before_a_stem_breaks_away_are_no_hysteresis(noise):
+    def strokes(seconds, seed, *faults):
+        scenario = Scenario('strokes', seconds, cv=RandomSteps(seed=seed), faults=faults)
+        columns = dict(simulate(scenario, rate=200.0, model='lugre', seed=seed))
+        rng = np.random.default_rng(seed)
+        columns['x1'] = columns['x1'] + noise * rng.standard_normal(len(columns['x1']))
+        columns['ps'] = columns['ps'] + 100.0 * rng.standard_normal(len(columns['x1']))
+        columns['stamp'] = (np.arange(len(columns['x1'])) * 5_000_000).astype(np.int64)
+        return columns
+
+    learned = [FaultFree('strokes', strokes(600.0, 8208))]
+    settings = identify(learned, Settings.for_mode('monitor')).settings
+    assert settings.hysteresis == 0.0
+    doubled = strokes(600.0, 8209, Fault('f4', 0.05, 300.0))
+    view = run(doubled, settings).detector.signature.view()
+    assert view.cause == 'friction_up'
+    assert view.value == pytest.approx(1.0, rel=0.15)
 
 
 def test_hysteresis_of_the_diaphragm_is_no_friction():

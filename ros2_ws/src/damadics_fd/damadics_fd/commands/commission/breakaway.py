@@ -23,6 +23,8 @@ TRAVEL, BACK = 0.02, 0.001  # strokes of travel that give a direction, and what 
 REACH = 60.0  # s that are looked back for it
 STARTS = 8  # each way, that are needed
 CLEARLY = 3.0  # deviations from which a hysteresis is one
+BRISTLES = 1e-4  # m; a stem gives by less, elastically, before it breaks away
+LASTS = 0.1  # share of a hysteresis that is left beyond it: a diaphragm needs a longer way
 LEAST = 0.1  # of the friction: less is within what the model of friction leaves open
 UNSURE, MODEL = 0.15, 0.02  # deviation as a share of the hysteresis, and of the friction
 
@@ -51,16 +53,20 @@ def breakaway(signals: Signals, s: Settings, friction: float) -> Breakaway:
     b = blocks(signals, SHORT)
     x, dp = signals.x, signals.dp
     noise = 1.4826 * float(np.median(np.abs(np.diff(x, 3)))) / np.sqrt(20.0)
+    elastic = max(AWAY * noise, BRISTLES / s.stroke)
     borne, starts = [], []
     whole = b.index[2:] - b.index[:-2] == 2
     for k in np.flatnonzero(b.standing[:-2] & b.moving[2:] & whole):
-        first, last = np.searchsorted(signals.t, b.t[k] + np.array([-3.5, 2.5]) * SHORT)
+        first, last = np.searchsorted(signals.t, b.t[k] + np.array([-3.5, 5.5]) * SHORT)
         t, xs = signals.t[first:last], x[first:last]
         still = (t < b.t[k]) & (t >= b.t[k] - 1.5 * SHORT)
         if still.sum() < 4:
             continue
         place, way = float(np.mean(xs[still])), float(np.sign(b.v[k + 2]))
-        left = int(np.argmax(_twice((xs - place) * way > AWAY * noise) & (t >= b.t[k])))
+        gone = (xs - place) * way
+        left, beyond = (
+            int(np.argmax(_twice(gone > far) & (t >= b.t[k]))) for far in (AWAY * noise, elastic)
+        )
         plug = float(plug_per_pascal(s, np.array([place]))[0]) * dp[first:last]
         air = s.signed_area * signals.ps[first:last] * way
         held = s.mass * s.gravity - (plug if s.flow_to == 'open' else -plug)
@@ -70,14 +76,15 @@ def breakaway(signals: Signals, s: Settings, friction: float) -> Breakaway:
         if left == 0 or np.isnan(seen):
             continue
         borne.append((seen, rate))
-        speed = np.polyfit(t[left:], xs[left:] * way, 1)[0] if len(t) - left > 2 else 0.0
+        early = slice(left, int(np.searchsorted(t, b.t[k] + 2.5 * SHORT)))
+        speed = np.polyfit(t[early], gone[early], 1)[0] if len(t[early]) > 2 else 0.0
         onset = float(t[left]) - min(AWAY * noise / max(float(speed), 1e-9), 2.0 * SHORT)
         at_onset, _ = _line_before(t, held, air, onset, s.ps_lag)
-        starts.append((at_onset, came_from(b, int(k), place) * way))
+        past = _line_before(t, held, air, float(t[beyond]), s.ps_lag)[0] if beyond else np.nan
+        starts.append((at_onset, past, came_from(b, int(k), place) * way))
     if not borne:
         return Breakaway(0.0, 0.0, 0.0)
-    forces, ways = np.array([start for start in starts if np.isfinite(start[0])]).reshape(-1, 2).T
-    found = hysteresis(forces[ways > 0.0], forces[ways < 0.0], friction)
+    found = hysteresis(*np.array(starts).T, friction)
     return Breakaway(max(static_friction(*np.array(borne).T), 0.0), *found)
 
 
@@ -141,26 +148,38 @@ def came_from(b: Blocks, k: int, place: float) -> float:
     return way if beyond < BACK else 0.0
 
 
-def hysteresis(going_on: Floats, turning: Floats, friction: float) -> tuple[float, float]:
+def hysteresis(onset: Floats, beyond: Floats, way: Floats, friction: float) -> tuple[float, float]:
     """
     Tell the hysteresis of the diaphragm from the forces at which strokes begin.
 
-    :param going_on: forces of strokes that go on in the direction the stem came from [N].
-    :param turning: of strokes that turn back [N].
+    A stem that turns back gives elastically as well, in the contact itself. That is over when it
+    has broken away, while the diaphragm still has a way to go.
+
+    :param onset: forces at which strokes begin [N]; NaN where not known.
+    :param beyond: forces when the stem has gone further than its contact gives [N].
+    :param way: 1 where a stroke goes on in the direction the stem came from, -1 where it turns
+        back, 0 where that is not known.
     :param friction: dry friction of the moving stem, hysteresis included [N].
     :return: hysteresis and its deviation [N]; 0, 0 where none is seen.
     """
-    if min(len(going_on), len(turning)) < STARTS:
+    found, std = _lag_behind(onset, way)
+    if not (found >= LEAST * friction and found >= CLEARLY * std):
         return 0.0, 0.0
-
-    def middle(forces: Floats) -> tuple[float, float]:
-        median = float(np.median(forces))
-        spread = 1.86 * float(np.median(np.abs(forces - median)))
-        return median, spread / float(np.sqrt(len(forces)))
-
-    (on, on_std), (back, back_std) = middle(going_on), middle(turning)
-    found, std = 0.5 * (on - back), 0.5 * float(np.hypot(on_std, back_std))
-    if found < LEAST * friction or found < CLEARLY * std:
+    if _lag_behind(beyond, way)[0] < LASTS * found:
         return 0.0, 0.0
     found = min(found, friction)
     return found, float(np.sqrt(std**2 + (UNSURE * found) ** 2 + (MODEL * friction) ** 2))
+
+
+def _lag_behind(force: Floats, way: Floats) -> tuple[float, float]:
+    """Return half of what strokes that turn back need less, and its deviation [N]."""
+    middle, variance = [], 0.0
+    for direction in (1.0, -1.0):
+        forces = force[np.isfinite(force) & (way == direction)]
+        if len(forces) < STARTS:
+            return float('nan'), float('nan')
+        median = float(np.median(forces))
+        spread = 1.86 * float(np.median(np.abs(forces - median)))
+        middle.append(median)
+        variance += spread**2 / len(forces)
+    return 0.5 * (middle[0] - middle[1]), 0.5 * float(np.sqrt(variance))
