@@ -13,8 +13,9 @@ from damadics_fd.core.monitor import run
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.settings.identified import FaultFree
 from damadics_plant import Fault, Scenario, simulate
+from damadics_plant.actuator.parameters import LuGreActuator
 from damadics_plant.actuator.twin import twin_of
-from damadics_plant.scenarios.sources import RandomSteps, Recorded
+from damadics_plant.scenarios.sources import RandomSteps, Recorded, Sine
 
 from . import courses, kinds
 from . import valve as foreign
@@ -183,6 +184,18 @@ def test_static_friction_is_found_however_fast_the_stem_is_pulled(seed):
     columns = foreign.simulate(build, courses.steps(300.0, seed), seed=seed)
     found = breakaway(gather([FaultFree('strokes', columns)]), b.settings, b.friction)
     assert found.force == pytest.approx(build.static * build.dry * build.force, rel=0.08)
+
+
+def test_static_friction_is_found_beneath_the_noise_of_the_benchmark():
+    """A stem is seen to have left its place when its spring has given by half the friction."""
+    swing = Sine(3.5e6, 7e4, 0.1)
+    scenario = Scenario('strokes', 600.0, cv=RandomSteps(seed=8221), p1=swing)
+    columns = dict(simulate(scenario, rate=200.0, model='lugre', noise=True, seed=8221))
+    columns['stamp'] = (np.arange(len(columns['x1'])) * 5_000_000).astype(np.int64)
+    signals = gather([FaultFree('strokes', columns)])
+    b = find_balance(signals, Settings.for_mode('monitor'))
+    found = breakaway(signals, b.settings, b.friction)
+    assert found.force == pytest.approx(LuGreActuator().static, rel=0.1)
 
 
 @pytest.mark.parametrize('lag', [0.1, 0.2])

@@ -24,7 +24,7 @@ REACH = 60.0  # s that are looked back for it
 STARTS = 8  # each way, that are needed
 CLEARLY = 3.0  # deviations from which a hysteresis is one
 BRISTLES = 1e-4  # m; a stem gives by less, elastically, before it breaks away
-LASTS = 0.1  # share of a hysteresis that is left beyond it: a diaphragm needs a longer way
+LASTS = 0.18  # share of a hysteresis that is left beyond it: a diaphragm needs a longer way
 LEAST = 0.1  # of the friction: less is within what the model of friction leaves open
 UNSURE, MODEL = 0.15, 0.02  # deviation as a share of the hysteresis, and of the friction
 
@@ -42,8 +42,8 @@ def breakaway(signals: Signals, s: Settings, friction: float) -> Breakaway:
     Return the friction that the stem overcomes when it begins to move.
 
     While it stands the force rises by itself; a line through the last tenth of a second tells
-    what it was when the stem left its place. By the time that it is seen to have left it, the
-    diaphragm has given already: of its hysteresis the force at the onset of the motion tells.
+    what it was when the stem left its place. That was before it is seen beyond the noise: by then
+    spring and diaphragm have given already.
 
     :param signals: the samples.
     :param s: settings with what commission found.
@@ -54,7 +54,7 @@ def breakaway(signals: Signals, s: Settings, friction: float) -> Breakaway:
     x, dp = signals.x, signals.dp
     noise = 1.4826 * float(np.median(np.abs(np.diff(x, 3)))) / np.sqrt(20.0)
     elastic = max(AWAY * noise, BRISTLES / s.stroke)
-    borne, starts = [], []
+    starts = []
     whole = b.index[2:] - b.index[:-2] == 2
     for k in np.flatnonzero(b.standing[:-2] & b.moving[2:] & whole):
         first, last = np.searchsorted(signals.t, b.t[k] + np.array([-3.5, 5.5]) * SHORT)
@@ -62,30 +62,42 @@ def breakaway(signals: Signals, s: Settings, friction: float) -> Breakaway:
         still = (t < b.t[k]) & (t >= b.t[k] - 1.5 * SHORT)
         if still.sum() < 4:
             continue
-        place, way = float(np.mean(xs[still])), float(np.sign(b.v[k + 2]))
-        gone = (xs - place) * way
-        left, beyond = (
+        place, sign = float(np.mean(xs[still])), float(np.sign(b.v[k + 2]))
+        gone = (xs - place) * sign
+        left, free = (
             int(np.argmax(_twice(gone > far) & (t >= b.t[k]))) for far in (AWAY * noise, elastic)
         )
-        plug = float(plug_per_pascal(s, np.array([place]))[0]) * dp[first:last]
-        air = s.signed_area * signals.ps[first:last] * way
+        steady = np.polyval(np.polyfit(t - t[0], dp[first:last], 1), t - t[0])  # not its noise
+        plug = float(plug_per_pascal(s, np.array([place]))[0]) * steady
+        air = s.signed_area * signals.ps[first:last] * sign
         held = s.mass * s.gravity - (plug if s.flow_to == 'open' else -plug)
-        held = (held - s.stiffness * s.stroke * (place + s.spring_origin)) * way
-        near = t >= b.t[k] - 1.5 * SHORT
-        seen, rate = _line_before(t[near], held[near], air[near], float(t[left]), s.ps_lag)
-        if left == 0 or np.isnan(seen):
+        held = (held - s.stiffness * s.stroke * (place + s.spring_origin)) * sign
+        if left == 0:
             continue
-        borne.append((seen, rate))
-        early = slice(left, int(np.searchsorted(t, b.t[k] + 2.5 * SHORT)))
-        speed = np.polyfit(t[early], gone[early], 1)[0] if len(t[early]) > 2 else 0.0
-        onset = float(t[left]) - min(AWAY * noise / max(float(speed), 1e-9), 2.0 * SHORT)
-        at_onset, _ = _line_before(t, held, air, onset, s.ps_lag)
-        past = _line_before(t, held, air, float(t[beyond]), s.ps_lag)[0] if beyond else np.nan
-        starts.append((at_onset, past, came_from(b, int(k), place) * way))
-    if not borne:
+        early = t < t[left] + SHORT
+        onset = _force_at(departure(t[early], gone[early]), t, held, air, s.ps_lag)
+        beyond = _force_at(float(t[free]), t, held, air, s.ps_lag) if free else float('nan')
+        if np.isfinite(onset):
+            starts.append((onset, beyond, came_from(b, int(k), place) * sign))
+    if not starts:
         return Breakaway(0.0, 0.0, 0.0)
-    found = hysteresis(*np.array(starts).T, friction)
-    return Breakaway(max(static_friction(*np.array(borne).T), 0.0), *found)
+    onsets, beyonds, ways = np.array(starts).T
+    going_on = onsets[ways > 0.0]
+    static = float(np.median(going_on if len(going_on) >= STARTS else onsets))
+    return Breakaway(max(static, 0.0), *hysteresis(onsets, beyonds, ways, friction))
+
+
+def departure(t: Floats, gone: Floats) -> float:
+    """
+    Return when a stem left its place: before it is seen beyond the noise.
+
+    :param t: [s].
+    :param gone: way from the place, in the direction of the stroke.
+    :return: the corner of a line that rests and then rises, which leaves least.
+    """
+    since = np.maximum(t - t[:, None], 0.0)[:-2]
+    explained = np.maximum(since @ gone, 0.0) ** 2 / np.sum(since**2, axis=1)
+    return float(t[int(np.argmax(explained))])
 
 
 def _twice(away: Mask) -> Mask:
@@ -93,41 +105,19 @@ def _twice(away: Mask) -> Mask:
     return both
 
 
-def _line_before(
-    t: Floats, held: Floats, air: Floats, at: float, lag: float
-) -> tuple[float, float]:
+def _force_at(at: float, t: Floats, held: Floats, air: Floats, lag: float) -> float:
     """
-    Return the force at an instant and its rate, by lines through the tenth before it.
+    Return the force at an instant, by lines through the tenth of a second before it.
 
     What a transmitter of first order shows lags its input by its own rate times the lag.
     """
     before = (t < at - 0.1 * SHORT) & (t >= at - 2.0 * SHORT)
     if before.sum() < 4:
-        return float('nan'), float('nan')
+        return float('nan')
     since = t[before] - at
-    (held_rate, held_at), (air_rate, air_at) = (
-        np.polyfit(since, force[before], 1) for force in (held, air)
-    )
-    return float(held_at + air_at + lag * air_rate), float(held_rate + air_rate)
-
-
-def static_friction(force: Floats, rate: Floats) -> float:
-    """
-    Return the force at which a stem leaves its place, however slowly it is pulled.
-
-    The faster the force rises, the more it has risen by the time that the stem is seen to have
-    left: the line of Theil and Sen through force over rate tells what it is at a rate of 0.
-
-    :param force: of each start, as its stem was seen to leave [N].
-    :param rate: at which it rose [N/s].
-    :return: [N].
-    """
-    i, j = np.triu_indices(len(force), 1)
-    apart = np.abs(rate[j] - rate[i]) > 1e-9 * np.max(np.abs(rate), initial=1e-9)
-    if not apart.any():
-        return float(np.median(force))
-    slope = float(np.median((force[j] - force[i])[apart] / (rate[j] - rate[i])[apart]))
-    return float(np.median(force - slope * rate))
+    held_at = np.polyfit(since, held[before], 1)[1]
+    air_rate, air_at = np.polyfit(since, air[before], 1)
+    return float(held_at + air_at + lag * air_rate)
 
 
 def came_from(b: Blocks, k: int, place: float) -> float:
@@ -165,7 +155,8 @@ def hysteresis(onset: Floats, beyond: Floats, way: Floats, friction: float) -> t
     found, std = _lag_behind(onset, way)
     if not (found >= LEAST * friction and found >= CLEARLY * std):
         return 0.0, 0.0
-    if _lag_behind(beyond, way)[0] < LASTS * found:
+    left, left_std = _lag_behind(beyond, way)
+    if left < max(LASTS * found, 2.0 * left_std):
         return 0.0, 0.0
     found = min(found, friction)
     return found, float(np.sqrt(std**2 + (UNSURE * found) ** 2 + (MODEL * friction) ** 2))
