@@ -166,3 +166,15 @@ def test_a_record_that_stood_still_goes_on_elsewhere():
         rows[begin : begin + 150, 1:] = rows[begin, 1:]
     trace = ScadaMonitor(SETTINGS, reference).run_samples(rows)
     assert not trace['alarm'].any(), trace['t'][trace['alarm']][:1]
+
+
+@pytest.mark.parametrize('period', [1, 2])
+def test_a_fault_that_has_gone_stands_for_a_minute_at_any_period(period):
+    """At two seconds, too: the next fault of a plant may come two minutes later."""
+    learned = learn(following(900, seed=2)[::period], SETTINGS, math.inf)
+    rows = following(700, seed=5)
+    rows[400:430, X] += 0.1
+    trace = ScadaMonitor(SETTINGS, learned).run_samples(rows[::period])
+    standing = trace['t'][trace['ratio'] >= 1.0]
+    assert 400 <= standing[0] <= 400 + 5 * period
+    assert 480 <= standing[-1] <= 520

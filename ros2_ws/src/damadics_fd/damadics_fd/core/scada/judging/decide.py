@@ -25,7 +25,8 @@ ONE_SAMPLE = 0.8  # of a limit, the most that a single sample brings
 JUMP = 6.0  # sigma from one sample to the next that may be a spike
 RETURNED = 0.3  # of a jump, by which the value may still be off when it has come back
 BACK = 4.0  # sigma within which it has come back
-RECOVERY = 60  # testable samples in a row without evidence after which a fault has gone
+# How long a residual must be testable in a row, without evidence, until its fault has gone.
+RECOVERY_S, FEWEST_GOOD = 60.0, 30  # s, samples
 # A fault that shows now and then, as when the stem turns, must stay away longer every time.
 AGAIN_S = 600.0
 LONGEST_RECOVERY = 3600
@@ -141,7 +142,7 @@ def decide(s: MonitorState, ref: Reference) -> None:
     for i in range(N_TESTS + 1):
         s.peaks[i] = max(s.peaks[i], s.ratios[i])
     s.ratio = top
-    stands = keep_standing(s)
+    stands = keep_standing(s, ref)
     if not stands:
         return
     if s.ratio < 1.0:
@@ -149,7 +150,7 @@ def decide(s: MonitorState, ref: Reference) -> None:
     if not s.stood:
         s.occurrence += 1
         again = s.occurrence > 1 and s.t - s.t_gone < AGAIN_S
-        s.recovery = min(2 * s.recovery, LONGEST_RECOVERY) if again else RECOVERY
+        s.recovery = min(2 * s.recovery, LONGEST_RECOVERY) if again else needed_good(ref)
         s.t_raised = s.t
         s.t_onset = onset
         s.t_shown[:] = math.nan
@@ -219,12 +220,18 @@ def test_friction(s: MonitorState, ref: Reference) -> None:
 
 
 @jit
-def keep_standing(s: MonitorState) -> bool:
+def needed_good(ref: Reference) -> int:
+    """Return the testable samples in a row without evidence after which a fault has gone."""
+    return max(FEWEST_GOOD, int(RECOVERY_S / max(ref.period, 1.0)))
+
+
+@jit
+def keep_standing(s: MonitorState, ref: Reference) -> bool:
     """
     Tell whether a fault stands; what cannot be tested now is not good.
 
-    A residual that showed a fault must be testable, without evidence, for as many samples as
-    RECOVERY, and a stem must have moved meanwhile.
+    A residual that showed a fault must be testable, without evidence, for as long as
+    `needed_good` says, and a stem must have moved meanwhile.
     """
     s.travel += abs(s.xm[0] - s.xm[1])
     any_stands = False
@@ -248,7 +255,7 @@ def keep_standing(s: MonitorState) -> bool:
             s.good[r] += 1
         if (
             s.stands[r] > 0
-            and s.good[r] >= max(s.recovery, RECOVERY)
+            and s.good[r] >= max(s.recovery, needed_good(ref))
             and (r != R1 or s.travel >= RECOVERY_TRAVEL)
         ):
             s.stands[r] = 0

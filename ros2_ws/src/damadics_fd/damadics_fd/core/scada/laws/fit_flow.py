@@ -26,6 +26,9 @@ LEAST_FLOW = 0.02  # of the meter's range; below it meters do not measure
 BETTER = 0.9
 METER = 0.002  # of the range: the least noise of a flow meter
 AVERAGED = 5  # samples
+# What a plant changes by itself within minutes, share of the flow: it comes with the load, and so
+# with the position, and a fit takes it for a slope of the characteristic.
+SLOW_CHANGE, SLOW_S = 0.01, 300.0
 MOVING = 0.01  # of the stroke between position and its longest lag: there a lag shows
 FEWEST_MOVING = 30  # samples
 
@@ -187,9 +190,11 @@ def _fit(
         left = left - np.median(left)
         spread = max(spread_of(left), 1e-4)
         weight = huber_weights(left)
-    share = effective(left) / len(left)
+    variance = spread**2 * len(left) / effective(left)
+    lasting = SLOW_S / max(float(np.median(np.diff(t))), 1e-3)
+    variance += SLOW_CHANGE**2 * min(lasting, len(left))
     normal = z.T @ (z * weight[:, None])  # the noise in X' tells nothing of the slope
-    v = np.linalg.inv(normal * share / spread**2 + precision)
+    v = np.linalg.inv(normal / variance + precision)
     c = np.minimum.accumulate(c)
     full = np.full(len(x), np.nan)
     full[good] = y - a @ c
