@@ -101,9 +101,11 @@ def children(process: int) -> list[Child]:
     """List what a process, such as `run`, has started."""
     found = []
     for number in Path(f'/proc/{process}/task/{process}/children').read_text().split():
-        words = Path(f'/proc/{number}/cmdline').read_bytes().decode().split('\0')
-        valve = next((w.removeprefix('__ns:=/') for w in words if w.startswith('__ns:=')), '')
-        found.append(Child(Path(words[1]).name, valve, int(number)))
+        with contextlib.suppress(FileNotFoundError, ProcessLookupError):  # it has ended meanwhile
+            words = Path(f'/proc/{number}/cmdline').read_bytes().decode().split('\0')
+            valve = next((w.removeprefix('__ns:=/') for w in words if w.startswith('__ns:=')), '')
+            if len(words) > 1:  # else it is just being started
+                found.append(Child(Path(words[1]).name, valve, int(number)))
     return found
 
 

@@ -26,6 +26,9 @@ GOLDEN = Path(__file__).parents[2] / 'bags'
 # what the monitor learns from is shortened, so that it decides within the test
 QUICK = {'t_on': 0.5, 't_w': 1.0, 't_learn': 16.0, 'travel_min': 0.01}
 
+# subscribers of estimator, detector and recorder together
+CHAIN = {'measurement': 2, 'estimate': 2, 'residual': 1, 'threshold': 1, 'fault_flag': 1}
+
 
 def excerpt(name: str, begin: float, end: float) -> dict[str, np.ndarray]:
     columns = read_columns(GOLDEN / f'{name}.mcap')
@@ -84,9 +87,11 @@ def test_live_replay_publishes_signature_and_events_as_the_nodes_do(tmp_path):
     columns = excerpt('lugre_spring', 48.0, 72.0)
     source = tmp_path / 'source.mcap'
     write_columns(source, columns, frame_id='LV-101')
-    own = {**surroundings(free_domain()), 'XDG_STATE_HOME': str(tmp_path / 'state')}
+    domain = free_domain()
+    own = {**surroundings(domain), 'XDG_STATE_HOME': str(tmp_path / 'state')}
     with Processes(tmp_path / 'logs', own) as processes:
         processes.start('damadics_fd', 'recorder', ['--out', str(tmp_path / 'bag')])
+        wait_for_subscribers(domain, processes, dict.fromkeys(('measurement', 'fault_event'), 1))
         settings = [f'--set={key}={value}' for key, value in QUICK.items()]
         processes.start('damadics_fd', 'replay', [str(source), '--live', '--rate', '4', *settings])
         wait_for_end(processes, 'replay')
@@ -141,7 +146,7 @@ def played(source: Path, folder: Path, mode: str, speed: int, changes: dict) -> 
         processes.start('damadics_fd', 'recorder', ['--out', str(folder / 'bag')])
         for node in ('detector', 'estimator'):
             processes.start('damadics_fd', node, parameters(mode=mode, **changes))
-        wait_for_chain(domain, processes)
+        wait_for_subscribers(domain, processes, CHAIN)
         processes.start(
             'damadics_fd',
             'replay',
@@ -160,13 +165,14 @@ def played(source: Path, folder: Path, mode: str, speed: int, changes: dict) -> 
     return folder / 'bag'
 
 
-def wait_for_chain(domain: int, processes: Processes, patience: float = 120.0) -> None:
-    """Wait until estimator, detector and recorder take their topics."""
+def wait_for_subscribers(
+    domain: int, processes: Processes, wanted: dict[str, int], patience: float = 120.0
+) -> None:
+    """Wait until topics are subscribed to, each by so many."""
     context = Context()
     rclpy.init(context=context, domain_id=domain)
     node = rclpy.create_node('watcher', context=context)
     deadline = time.monotonic() + patience
-    wanted = {'measurement': 2, 'estimate': 2, 'residual': 1, 'threshold': 1, 'fault_flag': 1}
     while any(node.count_subscribers(topic) < count for topic, count in wanted.items()):
         assert time.monotonic() < deadline
         processes.check()
