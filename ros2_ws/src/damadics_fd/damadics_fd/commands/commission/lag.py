@@ -16,7 +16,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from damadics_fd.commands.commission.signals import Blocks
+from damadics_fd.commands.commission.signals import Blocks, steady
 from damadics_fd.core.record import Floats
 from damadics_fd.core.settings import Settings
 
@@ -144,6 +144,8 @@ class _Scan:
         gain = plug_per_pascal(s, b.x)
         v = np.nan_to_num(b.v)
         dp = np.convolve(np.pad(b.dp, CALM // 2, 'edge'), np.full(CALM, 1.0 / CALM), 'valid')
+        if steady(b):  # what is left of its noise would call for no plug force
+            dp = np.full(len(dp), float(np.mean(b.dp[b.moving])))
         columns = [
             s.stroke * b.x,
             np.ones(len(v)),
@@ -241,10 +243,10 @@ class _Scan:
 
 def _sensor_noise(b: Blocks, s: Settings, runs: list[slice], gain: Floats) -> float:
     """Return the variance that noise of x1, p1, p2 puts into the force [N2]."""
-    thirds_x, thirds_p = [], []
+    thirds_x, thirds_p, quiet = [], [], steady(b)
     for run in runs:
         thirds_x.append(np.diff(b.x[run], 3))
-        thirds_p.append(np.diff(gain[run] * b.dp[run], 3))
+        thirds_p.append(np.diff(gain[run] * b.dp[run], 3) * (not quiet))
     # the third difference of white noise has 20 times its variance
     x = 1.4826 * float(np.median(np.abs(np.concatenate(thirds_x)))) / np.sqrt(20.0)
     plug = 1.4826 * float(np.median(np.abs(np.concatenate(thirds_p)))) / np.sqrt(20.0)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from damadics_fd.commands.commission.lag import STRIBECK, Mask, plug_per_pascal
-from damadics_fd.commands.commission.signals import Blocks
+from damadics_fd.commands.commission.signals import Blocks, calm
 from damadics_fd.core.record import Floats
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.signature.sliding import STICKING
@@ -72,7 +72,7 @@ def regressor(b: Blocks, s: Settings) -> tuple[Floats, Floats, Floats]:
     )
     hats = np.clip(1.0 - np.abs(b.x[:, None] * 10.0 - np.arange(11)), 0.0, 1.0)
     force = s.mass * s.gravity + air * s.area * b.ps - plug
-    return force, columns, plug[:, None] * hats
+    return force, columns, (gain * calm(b))[:, None] * hats
 
 
 def solve(

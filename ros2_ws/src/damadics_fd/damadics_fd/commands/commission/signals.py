@@ -20,6 +20,7 @@ GAP = 2.0  # s; delays start afresh after a longer one
 WHOLE = 0.75  # of the samples that a block needs
 SLOWEST, FASTEST = 0.02, 1.5  # strokes/s of a moving block
 STOPS = 0.03  # of the stroke next to a stop, where a block does not count
+VARIES = 1e-3  # of P1 - P2: less of a variation is none
 RATES = 0.02  # share by which the rates of two recordings may differ
 
 
@@ -214,3 +215,41 @@ def blocks(signals: Signals, width: float, lag: float = 0.0, carried: float = 0.
     if felt > 0.0:  # what the delay carries over from the block before
         rough[1:] = np.maximum(rough[1:], rough[:-1] * np.exp(-width / felt))
     return Blocks(width, index, part, t, mx, mcv, mdp, mps, v, rate_dp, rough)
+
+
+def calm(b: Blocks) -> Floats:
+    """
+    Return P1 - P2 as the blocks beside each show it, or its mean where it is steady.
+
+    With its own noise in a column, the best correction of the plug force would be the one that
+    takes the noise out of the balance: none of it, where P1 - P2 is steady.
+
+    :param b: blocks.
+    :return: [Pa].
+    """
+    if steady(b):
+        return np.full(len(b.dp), float(np.mean(b.dp[b.moving])))
+    return _beside(b)
+
+
+def steady(b: Blocks) -> bool:
+    """
+    Tell whether P1 - P2 varies too little, its noise apart, to tell the plug force by.
+
+    :param b: blocks.
+    :return: True where it does.
+    """
+    use = b.moving
+    if not use.any():
+        return True
+    dp, near = b.dp[use], _beside(b)[use]
+    together = float(np.mean((dp - np.mean(dp)) * (near - np.mean(near))))  # no noise in common
+    return together < (VARIES * max(float(np.mean(np.abs(dp))), 1.0)) ** 2
+
+
+def _beside(b: Blocks) -> Floats:
+    found: Floats = b.dp.copy()
+    whole = b.index[4:] - b.index[:-4] == 4
+    mean = 0.25 * (b.dp[:-4] + b.dp[1:-3] + b.dp[3:-1] + b.dp[4:])
+    found[2:-2] = np.where(whole, mean, found[2:-2])
+    return found
