@@ -57,12 +57,12 @@ def stamp_of(message) -> int:
 
 
 def send(peer, columns: dict[str, np.ndarray]) -> None:
-    """Send samples no faster than the chain takes them."""
+    """Send samples no faster than the chain takes them: the queue of signatures holds one."""
     rows = zip(columns['stamp'].tolist(), *(columns[s].tolist() for s in SIGNALS), strict=True)
     before = len(peer.got['threshold'])
     for n, (stamp, *values) in enumerate(rows, 1):
         peer.send(stamp, **dict(zip(SIGNALS, values, strict=True)))
-        if n % 200 == 0:
+        if n % RATE == 0:
             assert peer.wait(lambda n=n: len(peer.got['threshold']) >= before + n), 'samples lost'
 
 
