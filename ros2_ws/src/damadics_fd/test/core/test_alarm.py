@@ -35,6 +35,16 @@ def test_a_single_spike_is_a_near_miss():  # IN-3, AM-2
 
 
 @pytest.mark.plain
+def test_a_residual_between_the_threshold_and_a_raised_level_is_one_near_miss():
+    """Where commission raises the level, no vote remembers a residual that stays below it."""
+    valve = Valve(level_maintenance=1.7, level_specification=3.4, level_failure=6.8)
+    valve.feed(0.1, 1.0)
+    valve.feed(1.3, 2.0)
+    valve.feed(0.1, 1.0)
+    assert valve.names() == ['near_miss']
+
+
+@pytest.mark.plain
 def test_m_of_n_counts_samples_that_are_not_in_a_row():
     valve = Valve(decide_m=3, decide_n=5)
     for ratio in (1.2, 0.1, 1.2, 0.1):

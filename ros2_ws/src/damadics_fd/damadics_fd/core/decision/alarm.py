@@ -203,7 +203,7 @@ def judge(
             a.excursion = NEVER
             a.latched = c.latch
             events |= 1 << CLEARED
-    elif a.excursion >= 0 and not busy:
+    elif a.excursion >= 0 and not busy and not exceed:
         a.excursion = NEVER
         a.near_misses += 1
         events |= 1 << NEAR_MISS
