@@ -20,6 +20,7 @@ def driven(
     swing: float = 1.0,
     jump: float = math.nan,
     air: float = 1.0,
+    centre: float = 0.5,
     **faults: float,
 ) -> np.ndarray:
     """
@@ -29,6 +30,7 @@ def driven(
     :param swing: how much the command moves.
     :param jump: of the command every 40 s, which is then held between samples.
     :param air: in the chamber, over what pressure and volume say.
+    :param centre: of the command's motion.
     """
     rng = np.random.default_rng(seed)
     act = SETTINGS.record()['act'][0]
@@ -36,7 +38,9 @@ def driven(
     for name, strength in faults.items():
         some[name] = strength
     t = np.arange(float(seconds))
-    cv = 0.5 + swing * (0.25 * np.sin(2 * np.pi * 0.02 * t) + 0.1 * np.sin(2 * np.pi * 0.007 * t))
+    cv = centre + swing * (
+        0.25 * np.sin(2 * np.pi * 0.02 * t) + 0.1 * np.sin(2 * np.pi * 0.007 * t)
+    )
     held = not math.isnan(jump)
     if held:
         cv = cv - jump * (t // 40 % 2)

@@ -8,6 +8,11 @@ import numpy as np
 import pytest
 from damadics_fd.core.scada.laws.fit_flow import fit_flow
 from damadics_fd.core.scada.laws.flow_law import characteristic, flow_doubt
+from damadics_fd.core.scada.learning import learn
+from damadics_fd.core.scada.monitor import ScadaMonitor
+from damadics_fd.core.scada.state import NOMINAL
+
+from .driven import SETTINGS, driven
 
 QUARTER = 900
 AT, SLOPE = 0.65, -5.0
@@ -43,3 +48,14 @@ def test_slow_changes_of_a_plant_are_no_slope_of_the_characteristic(away):
         beyond.append(abs(said - SLOPE * away) / (SIGMAS * doubts[-1]))
     assert max(beyond) < 1.0
     assert max(doubts) < 0.25, 'a doubt that nothing could contradict'
+
+
+@pytest.mark.parametrize('seed', range(4))
+def test_a_line_learned_near_the_end_of_the_meter_is_unsure_far_below(seed):
+    """There the flow is four times less noisy than where gain and offset were learned."""
+    reference = learn(driven(500, seed, centre=0.44, swing=0.1), SETTINGS, 500.0)
+    assert reference['flow_kind'][0] == NOMINAL
+    assert reference['f_mean'][0] > 0.85
+    monitor = ScadaMonitor(SETTINGS, reference)
+    low = driven(600, seed + 50, centre=0.85, swing=0.3)
+    assert not monitor.run_samples(low)['alarm'].any()

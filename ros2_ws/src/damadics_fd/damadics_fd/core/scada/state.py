@@ -68,6 +68,7 @@ class Reference(Record):
     x_sd: float
     f_mean: float  # of the flow, where r2 was learned
     f_sd: float
+    f_sigma: float  # of F' - f there
     se: Annotated[Floats, N_TESTS]  # allowance that grows with the distance from there
     pressure: Annotated[Rows[PressureFilter], 2]
     hold: bool  # CV is held between samples

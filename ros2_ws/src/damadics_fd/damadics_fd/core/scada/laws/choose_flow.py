@@ -104,7 +104,7 @@ def _stated_flow(ref: Reference, prediction: Prediction, flow: Floats) -> bool:
         left = (y - g[0] - g[1] * f) / sq
         weight = np.minimum(1.0, 2.0 * huber_weights(left)) / sq**2
     ref.g0, ref.g1 = g
-    ref.f_mean, ref.f_sd = instrument.mean(), max(instrument.std(), 1e-3)
+    _tell_where(ref, instrument, 1.0 / sq**2)
     sigma, gain, offset = STATED_FLOW
     error = 3.0 * spread_of(left * sq) / (math.sqrt(len(f)) * float(ref.f_sd))
     off = abs(g[0] + (g[1] - 1.0) * float(ref.f_mean))
@@ -118,6 +118,14 @@ def _stated_flow(ref: Reference, prediction: Prediction, flow: Floats) -> bool:
         ref.g1 = 1.0
         ref.g0 = float(np.median(y - f))
     return right
+
+
+def _tell_where(ref: Reference, f: Floats, weight: Floats) -> None:
+    """Keep where and by which sigma F' = g0 + g1 f was learned: away from there it is unsure."""
+    ref.f_mean = np.average(f, weights=weight)
+    spread = math.sqrt(float(np.average((f - ref.f_mean) ** 2, weights=weight)))
+    ref.f_sd = max(spread, 1e-3)
+    ref.f_sigma = math.sqrt(len(f) / float(weight.sum()))
 
 
 def slow_sigma(
