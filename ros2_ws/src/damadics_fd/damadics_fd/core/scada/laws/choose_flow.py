@@ -122,9 +122,7 @@ def _stated_flow(ref: Reference, prediction: Prediction, flow: Floats) -> bool:
 
 def _tell_where(ref: Reference, f: Floats, weight: Floats) -> None:
     """Keep where and by which sigma F' = g0 + g1 f was learned: away from there it is unsure."""
-    ref.f_mean = np.average(f, weights=weight)
-    spread = math.sqrt(float(np.average((f - ref.f_mean) ** 2, weights=weight)))
-    ref.f_sd = max(spread, 1e-3)
+    ref.f_mean, ref.f_sd = f.mean(), max(f.std(), 1e-3)
     ref.f_sigma = math.sqrt(len(f) / float(weight.sum()))
 
 
