@@ -158,7 +158,7 @@ def flow_residual(s: MonitorState, ref: Reference, x: float, flow: float) -> flo
             s.testable[R2] = 0
             return math.nan if math.isnan(s.f) else 0.0
         # what is uncertain by a sigma of where it was learned may be many of a smaller one
-        s.lever[1] = lever(s.f, ref.f_mean, ref.f_sd * min(s.sq / ref.f_sigma, 1.0))
+        s.lever[1] = lever(s.f, ref.f_mean, ref.f_sd / max(ref.f_sigma / s.sq, 1.0))
         return (flow - ref.g0 - ref.g1 * s.f) / s.sq  # NaN where not measured
     law = ref.flow_law
     s.testable[R2] = 0
