@@ -23,6 +23,8 @@ for package in ros2_ws/src/*/setup.py; do
 done
 mkdir -p ros2_ws/log
 log=ros2_ws/log/build.txt
+# Else no job would begin while the machine has anything else to do.
+export MAKEFLAGS=${MAKEFLAGS:--j$(nproc)}
 echo 'Building the workspace ...'
 if ! (cd ros2_ws && "$python" -m colcon --log-base log build --event-handlers console_cohesion+ \
   --cmake-args -GNinja -DBUILD_TESTING=OFF "-DPython3_EXECUTABLE=$python" \

@@ -47,7 +47,7 @@ needs_namespace = pytest.mark.skipif(
 )
 
 
-def in_namespace(script: str, folder: Path, patience: float = 300.0) -> None:
+def in_namespace(script: str, folder: Path, patience: float = 240.0) -> None:
     """Run a script of bash in a network of its own; whatever it has started ends with it."""
     environment = {**os.environ, 'RCUTILS_LOGGING_BUFFERED_STREAM': '0'}
     process = subprocess.Popen(
@@ -55,6 +55,9 @@ def in_namespace(script: str, folder: Path, patience: float = 300.0) -> None:
     )
     try:
         assert process.wait(patience) == 0
+    except subprocess.TimeoutExpired:
+        logs = {path.name: path.read_text()[-1000:] for path in folder.glob('*.log')}
+        pytest.fail(f'it still waits: {logs}')
     finally:
         with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)

@@ -66,8 +66,9 @@ async def serve(path: Path, ros_args: list[str]) -> int:
     listener = _listen(host, port)
     graph = Graph('http', ros_args)
     try:
-        stream = Stream(asyncio.get_running_loop())
-        watch = Watch(graph.node, stream.state, stream.event)
+        watch = Watch(graph.node)
+        stream = Stream(asyncio.get_running_loop(), watch.valves)
+        watch.tell(stream.state, stream.event)
         app = application(watch, Actions(graph.node, watch), stream, guard)
         graph.start()
         server = uvicorn.Server(
