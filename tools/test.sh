@@ -17,7 +17,7 @@ sys.exit(ending(lambda: int(pytest.main())))
 }
 
 beside() {
-  (renice -n 19 "$BASHPID" > /dev/null; stream others 'not slow and not ros' "$@")
+  (renice -n 5 "$BASHPID" > /dev/null; stream others 'not slow and not ros' "$@")
   others=$?
   stream servers 'not slow and ros and servers' "$@"
   merged "$others" $?
