@@ -6,6 +6,7 @@ import pytest
 from damadics_fd.core.scada.learning import learn
 from damadics_fd.core.scada.monitor import ScadaMonitor
 from damadics_fd.core.scada.naming.isolation import Isolator
+from damadics_fd.core.scada.samples import X
 
 from .driven import SETTINGS, driven
 
@@ -28,3 +29,14 @@ def test_like_faults_that_have_grown(reference, fault, strength, like, seed):
     assert found.best.strength == pytest.approx(strength, rel=0.2)
     costs = {h.fault: h.cost for h in found.ranking}
     assert costs[like] > costs[fault]
+
+
+@pytest.mark.parametrize('seed', [31, 32, 33])
+def test_a_stem_that_does_not_show_it_is_no_reason_against_a_fault_of_the_seat(reference, seed):
+    """The flow pushes a plug on a changed seat by less than the model of the stem is known."""
+    monitor = ScadaMonitor(SETTINGS, reference)
+    record = driven(700, seed, 60, f2=0.4)
+    record[:, X] = driven(700, seed)[:, X]
+    monitor.run_samples(record)
+    found = Isolator(monitor.record[0], reference[0]).isolate(monitor.state, abrupt=False)
+    assert 2 in found.candidates

@@ -307,6 +307,7 @@ class ScadaMonitor:
         bring_up(self._state, self._record, reference, record)
         self.state.t_test = max(self.state.t_test, self.state.t)
         self.state.zero[:] = self.state.t
+        self.state.stretch[:] = 0.0
         self.state.llr_zero = self.state.t
         self._buffer = np.empty((0, 7))
         self._filled = 0

@@ -137,7 +137,9 @@ class MonitorState(Record):
     good: Annotated[Ints, N_RESIDUALS]  # testable samples in a row without evidence
     inside: int  # the stem is where it was learned
     travel: float  # of the model since the last evidence in r1
-    lever: Annotated[Floats, 2]
+    away: Annotated[Floats, 2]  # from where r1, r2 were learned, in its standard deviations
+    lever: Annotated[Floats, 2]  # standard error there over that in the middle
+    air_doubt: float  # what the air that was found adds to that of r1
     saved: Annotated[Floats, N_TESTS, 2]  # statistics before a jump that may be a spike
     jumped: Annotated[Ints, N_RESIDUALS]
     spikes: Annotated[Ints, N_RESIDUALS]
@@ -168,6 +170,8 @@ class MonitorState(Record):
     rough_size: Annotated[Ints, N_ROUGH]
     g: Annotated[Floats, N_TESTS, 2]
     zero: Annotated[Floats, N_TESTS, 2]  # when g was last zero: estimate of the onset
+    # since then: samples, sum of `away`, standard errors of the sum that the latter cost
+    stretch: Annotated[Floats, N_TESTS, 2, 3]
     anchor: float  # where the stem moved to last, and samples since then
     rest: int
     lasting: float  # of r1 of a law, no evidence where it lasts

@@ -8,6 +8,7 @@ import numpy as np
 
 from damadics_fd.core.jit import jit
 from damadics_fd.core.scada.judging.cusum import FRICTION_TEST, QUICK, R1, R2, TEST_RESIDUAL, TESTS
+from damadics_fd.core.scada.judging.leverage import more_unsure
 from damadics_fd.core.scada.judging.roughness import rougher
 from damadics_fd.core.scada.laws.stem_law import shrink
 from damadics_fd.core.scada.state import LAW, N_RESIDUALS, N_TESTS, MonitorState, Reference
@@ -39,6 +40,7 @@ def silence(s: MonitorState) -> None:
     s.g[:] = 0.0
     s.saved[:] = 0.0
     s.zero[:] = s.t
+    s.stretch[:] = 0.0
     s.llr = 0.0
     s.llr_zero = s.t
     s.ratios[:] = 0.0
@@ -115,15 +117,21 @@ def decide(s: MonitorState, ref: Reference) -> None:
             z = (value - ref.mu[i]) / (ref.sd[i] * rougher(s, ref, r, SCALES[i]))
             z = min(max(z, -ref.clip[i]), ref.clip[i])
             k = ref.k[i]
+            unsure = 0.0
             if r <= R2:
-                k += ref.se[i] * (s.lever[r] - 1.0)
-            s.beyond[i] = 1 if abs(z) > k else 0
-            z = min(max(z, -k - ONE_SAMPLE * ref.h[i]), k + ONE_SAMPLE * ref.h[i])
+                k += ref.se[i] * s.air_doubt if r == R1 else 0.0
+                unsure = ref.se[i] * (s.lever[r] - 1.0)
+            s.beyond[i] = 1 if abs(z) > k + unsure else 0
+            most = k + unsure + ONE_SAMPLE * ref.h[i]
+            z = min(max(z, -most), most)
             for side in range(2):
                 g = s.g[i, side] + (z if side == 0 else -z) - k
+                if r <= R2 and ref.se[i] > 0.0:
+                    g -= ref.se[i] * more_unsure(s, i, side, s.away[r])
                 if g <= 0.0:
                     g = 0.0
                     s.zero[i, side] = s.t
+                    s.stretch[i, side, :] = 0.0
                 s.g[i, side] = min(
                     g, CAPS[0 if ref.k[i] > 1.0 else 1 if ref.k[i] >= QUICK else 2] * ref.h[i]
                 )
@@ -209,7 +217,7 @@ def test_friction(s: MonitorState, ref: Reference) -> None:
         wider = (s.xm[0] - s.xd) / s1
         z1d = z1 + wider
         # away from where it was learned the bias of the model may favour the wider play
-        unsure = ref.se[FIRST_OF_R1] * (s.lever[R1] - 1.0)
+        unsure = ref.se[FIRST_OF_R1] * (s.lever[R1] - 1.0 + s.air_doubt)
         gain = (0.5 * (z1 * z1 - z1d * z1d) - abs(wider) * unsure) / ref.kap2
         s.llr += min(max(gain, -LLR_CLIP), LLR_CLIP)
         s.llr = min(s.llr, CAPS[0] * ref.llr_limit)

@@ -6,6 +6,7 @@ import math
 
 from damadics_fd.core.jit import jit
 from damadics_fd.core.scada.judging.cusum import P1, P2, PROCESS, QUICK, R1, R2, T1, TEST_RESIDUAL
+from damadics_fd.core.scada.judging.leverage import lever
 from damadics_fd.core.scada.judging.predict import repeated, stands_still
 from damadics_fd.core.scada.judging.roughness import follow_roughness
 from damadics_fd.core.scada.laws.flow_law import flow_doubt, slope
@@ -75,13 +76,16 @@ def residuals(
         beyond = max(ref.low[X] - xm, xm - ref.high[X], 0.0)
         doubt += (abs(ref.stem_law.gain - 1.0) + BENT) * beyond
         s.lasting = DOUBT * STEM_LASTING * hours_unseen(ref)
+        s.away[0] = 0.0
         s.lever[0] = 1.0
     else:
         for i in range(N_WEIGHTS):
             correction += ref.w[i] * s.phi[i]
         raw = x - xm - correction
         doubt = 0.0
-        s.lever[0] = lever(xm, ref.x_mean, ref.x_sd) + OTHER_AIR * abs(s.air)
+        s.away[0] = (xm - ref.x_mean) / ref.x_sd
+        s.lever[0] = lever(s.away[0])
+        s.air_doubt = OTHER_AIR * abs(s.air)
     if min(xm, s.cv[0]) < STOP or max(xm, s.cv[0]) > 1.0 - STOP:
         s.t_stop = s.t + STOP_S
     if s.t < s.t_stop:
@@ -143,22 +147,17 @@ def follow_drift(
 
 
 @jit
-def lever(at: float, mean: float, sd: float) -> float:
-    """Return the standard error at a place over that in the middle of what was learned."""
-    away = (at - mean) / sd
-    return math.sqrt(1.0 + away * away)
-
-
-@jit
 def flow_residual(s: MonitorState, ref: Reference, x: float, flow: float) -> float:
     """Return r2 in sigma; 0 and not testable where meter or law say nothing."""
+    s.away[1] = 0.0
     s.lever[1] = 1.0
     if ref.flow_kind != LAW:
         if s.masked:
             s.testable[R2] = 0
             return math.nan if math.isnan(s.f) else 0.0
         # what is uncertain by a sigma of where it was learned may be many of a smaller one
-        s.lever[1] = lever(s.f, ref.f_mean, ref.f_sd / max(ref.f_sigma / s.sq, 1.0))
+        s.away[1] = (s.f - ref.f_mean) / ref.f_sd * max(ref.f_sigma / s.sq, 1.0)
+        s.lever[1] = lever(s.away[1])
         return (flow - ref.g0 - ref.g1 * s.f) / s.sq  # NaN where not measured
     law = ref.flow_law
     s.testable[R2] = 0
