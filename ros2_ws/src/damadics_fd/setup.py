@@ -40,7 +40,7 @@ setup(
             'replay = damadics_fd.start:replay',
             'verify = damadics_fd.commands.verify:main',
             'recover = damadics_fd.commands.recover:main',
-            'commission = damadics_fd.commands.commission.command:main',
+            'commission = damadics_fd.start:commission',
             'settings = damadics_fd.commands.settings:main',
         ],
     },

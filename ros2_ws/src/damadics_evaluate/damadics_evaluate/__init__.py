@@ -10,6 +10,9 @@ def main(argv: list[str] | None = None) -> int:
     :param argv: arguments, by default those of the process.
     :return: exit code.
     """
+    from damadics_fd.start import one_thread
+
+    one_thread()
     from damadics_evaluate import command
 
     return int(command.main(argv))

@@ -13,6 +13,7 @@ from damadics_fd.leave import INTERRUPTED, ending
 # numba takes these in wherever they are installed, for what no kernel of ours calls: a tenth of a
 # node's start and 30 MB
 UNUSED = ('scipy', 'cffi')
+THREADS = ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS')
 
 
 def run(module: str) -> int:
@@ -23,7 +24,19 @@ def run(module: str) -> int:
     :return: its exit code; 130 where Ctrl-C comes while it is imported, 2 where the middleware
         that the environment asks for is not installed.
     """
+    one_thread()
     return ending(lambda: _main(module))
+
+
+def one_thread() -> None:
+    """
+    Have linear algebra done in one thread, unless the environment says otherwise.
+
+    Matrices are long and narrow here: more threads take twice the CPU time for the same answer,
+    whose last bits would depend on the number of cores. To be called before numpy is imported.
+    """
+    for name in THREADS:
+        os.environ.setdefault(name, '1')
 
 
 def run_node(module: str) -> int:
@@ -104,3 +117,8 @@ def recorder() -> int:
 def replay() -> int:
     """Run the command `replay`."""
     return run('damadics_fd.commands.replay.replay')
+
+
+def commission() -> int:
+    """Run the command `commission`."""
+    return run('damadics_fd.commands.commission.command')

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TextIO
 
 from damadics_fd.commands.cluster import cluster
+from damadics_fd.start import one_thread
 
 from damadics_evaluate.baselines import DETECTORS
 from damadics_evaluate.benchmark.campaign import (
@@ -196,8 +197,7 @@ def _appending(file: Path) -> TextIO:
 @contextmanager
 def _executor(jobs: int | None, scheduler: str | None) -> Iterator[Executor]:
     if scheduler is None:
-        for name in ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS'):
-            os.environ.setdefault(name, '1')  # one process per core already
+        one_thread()
         context = multiprocessing.get_context('spawn')
         with ProcessPoolExecutor(jobs or os.cpu_count(), mp_context=context) as pool:
             yield pool
