@@ -3,6 +3,7 @@
 """Node `fleet`, live: fifty valves in one process, one faulty; killed and started again."""
 
 import array
+import itertools
 import time
 
 import numpy as np
@@ -186,11 +187,16 @@ def test_fifty_valves_in_one_process(processes, peer, tmp_path):
     assert [m.data for m in residuals] == result.decisions['residual'][rows].tolist()
 
     # a valve may send its own measurement
-    for n in range(1, 20):
+    numbers = itertools.count(1)
+
+    def measured_healthy() -> bool:
         message = Measurement(cv=0.5, x1=0.5, ps=1e5)
-        message.header.stamp.nanosec = n * PERIOD
+        stamp = message.header.stamp
+        stamp.sec, stamp.nanosec = divmod(next(numbers) * PERIOD, 10**9)
         own.publish(message)
-    assert peer.wait(lambda: other_flags[-1].state == FaultFlag.STATE_HEALTHY)
+        return other_flags[-1].state == FaultFlag.STATE_HEALTHY
+
+    assert peer.wait(measured_healthy)
 
     # a gateway may number the valves by a list of its own, some of them of other fleets
     layouts = peer.node.create_publisher(FleetLayout, 'fleet/layout', qos.FLAG)
@@ -201,10 +207,13 @@ def test_fifty_valves_in_one_process(processes, peer, tmp_path):
     assert layouts.wait_for_all_acked()
     refused = fleet.says('Refused of gateway')
     version, sender.layout = sender.layout, 7
-    stamps = np.array([50, 50, 51, 51]) * PERIOD
+    stamps = (next(numbers) + np.array([50, 50, 51, 51])) * PERIOD
     half = np.full(4, 0.5)
     sender.send([0, 1, 0, 1], stamps, {'cv': half, 'x1': half, 'ps': half})
-    assert peer.wait(lambda: other_flags[-1].header.stamp.nanosec == stamps[-1])
+    last = divmod(int(stamps[-1]), 10**9)
+    assert peer.wait(
+        lambda: (other_flags[-1].header.stamp.sec, other_flags[-1].header.stamp.nanosec) == last
+    )
     assert fleet.says('Refused of gateway') == refused
     sender.layout = version
 

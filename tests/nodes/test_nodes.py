@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Estimator and detector as processes: samples in, flags out, bad input, parameters, signals."""
 
+import itertools
 import os
 import signal
 import subprocess
@@ -156,10 +157,14 @@ def test_a_late_subscriber_gets_the_last_flag_at_once(chain):
 
 
 def test_silence_is_not_health(chain):
-    chain.send(0, 0.5, 0.5)
-    chain.send(PERIOD, 0.5, 0.5)
     flags = chain.got['fault_flag']
-    assert chain.wait(lambda: any(f.state == FaultFlag.STATE_HEALTHY for f in flags))
+    stamps = itertools.count(0, PERIOD)
+
+    def healthy() -> bool:
+        chain.send(next(stamps), 0.5, 0.5)  # until it is seen: it lasts no longer than the samples
+        return any(f.state == FaultFlag.STATE_HEALTHY for f in flags)
+
+    assert chain.wait(healthy)
     assert chain.wait(lambda: flags[-1].state == FaultFlag.STATE_NOT_MONITORING)
 
 
