@@ -77,13 +77,15 @@ def test_the_plug_force_is_found(wrong):
     assert found[:10] == pytest.approx(true[:10], rel=0.05)
 
 
-def test_noise_of_steady_pressures_does_not_hide_the_plug_force():
+@pytest.mark.parametrize('noise', [0.0, 1.4e-3])  # of the position, on top
+def test_noise_of_steady_pressures_does_not_hide_the_plug_force(noise):
     """Where P1 - P2 is steady, the correction that takes its noise out is no plug force at all."""
     scenario = Scenario('strokes', 600.0, cv=RandomSteps(seed=8225))
     columns = dict(simulate(scenario, rate=200.0, model='lugre', seed=8225))
     rng = np.random.default_rng(8225)
     for name in ('p1', 'p2'):
         columns[name] = columns[name] + 5e3 * rng.standard_normal(len(columns['x1']))
+    columns['x1'] = columns['x1'] + noise * rng.standard_normal(len(columns['x1']))
     columns['stamp'] = (np.arange(len(columns['x1'])) * 5_000_000).astype(np.int64)
     b = find_balance(gather([FaultFree('strokes', columns)]), Settings.for_mode('monitor'))
     assert b.settings.flow_to == 'open'
@@ -92,6 +94,19 @@ def test_noise_of_steady_pressures_does_not_hide_the_plug_force():
     assert b.settings.stiffness == pytest.approx(LuGreActuator().stiffness, rel=0.2)
     assert b.friction == pytest.approx(LuGreActuator().coulomb, rel=0.15)
     assert any('P1 - P2 did not vary' in name for name in b.undetermined)
+
+
+@pytest.mark.parametrize('seed', [8300, 8302])
+def test_noise_of_the_position_is_not_taken_for_a_lag(seed):
+    """A lag smooths it: what that saves of the misfit, with the plug's steep force, is no lag."""
+    scenario = Scenario('strokes', 600.0, cv=RandomSteps(seed=seed))
+    columns = dict(simulate(scenario, rate=200.0, model='lugre', seed=seed))
+    rng = np.random.default_rng(seed)
+    columns['x1'] = columns['x1'] + 1.4e-3 * rng.standard_normal(len(columns['x1']))
+    columns['stamp'] = (np.arange(len(columns['x1'])) * 5_000_000).astype(np.int64)
+    b = find_balance(gather([FaultFree('strokes', columns)]), Settings.for_mode('monitor'))
+    assert b.settings.ps_lag == 0.0
+    assert b.friction == pytest.approx(LuGreActuator().coulomb, rel=0.1)
 
 
 def test_five_percent_of_missing_or_doubled_samples_do_not_matter():

@@ -16,6 +16,16 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from damadics_fd.commands.commission.blur import (
+    CHANGING,
+    MOVING,
+    STILL,
+    Slopes,
+    believable,
+    lag_response,
+    noise_normal,
+    position_noise,
+)
 from damadics_fd.commands.commission.signals import Blocks, steady
 from damadics_fd.core.record import Floats
 from damadics_fd.core.settings import Settings
@@ -29,6 +39,7 @@ LEAST_GAIN = 16.0  # in chi-square, for which a lag is believed
 SIGN_GAIN = 9.0  # and a direction
 LEAST_LAG = 0.01  # s; what a model of blocks cannot tell from none
 CALM = 9  # blocks over which P1 - P2 is averaged: its noise must not call for a lag
+NEAR, CURVED = 0.005, 3  # strokes; degree: how the slope of the force over the position is taken
 UNSURE = 0.1  # share of the correction for sensor noise that may be wrong
 STATED = 0.3  # share to which a stated viscous friction, or the mass, is known
 LEAST_STD = 2e-3  # s; what blocks and model leave open
@@ -112,7 +123,7 @@ def find_lag(b: Blocks, s: Settings, viscous: float | None = None) -> Lag:
     air = 1.0 if least[1.0] <= least[-1.0] else -1.0
     score = {T: row[air].score for T, row in table.items()}
     T, std = _refine(score, lambda lag: scan.fits(lag, noise)[air].score)
-    corrected = scan.rows * scan.floating * (1.0 - _smoothing(b.width, T)) / noise
+    corrected = scan.rows * (scan.blurred + scan.floating) * (1.0 - _smoothing(b.width, T)) / noise
     gained = score[0.0] - min(score.values())
     if gained < max(LEAST_GAIN, UNSURE * corrected) or T < LEAST_LAG:
         T = 0.0
@@ -140,7 +151,8 @@ class _Scan:
     """Strokes laid out side by side, to be fitted for one lag after the other."""
 
     def __init__(self, b: Blocks, s: Settings, runs: list[slice], viscous: float | None) -> None:
-        self.known = {INERTIA: s.mass} | ({2: viscous} if viscous is not None else {})
+        known = {INERTIA: s.mass} | ({2: viscous} if viscous is not None else {})
+        self.known = {i: (value, (STATED * max(value, 0.1)) ** -2) for i, value in known.items()}
         gain = plug_per_pascal(s, b.x)
         v = np.nan_to_num(b.v)
         dp = np.convolve(np.pad(b.dp, CALM // 2, 'edge'), np.full(CALM, 1.0 / CALM), 'valid')
@@ -159,25 +171,36 @@ class _Scan:
         self.precision = np.diag(1.0 / np.array([np.inf] * 4 + [0.01 * scale, 0.2, np.inf]) ** 2)
         self.plugged = s.plug_diameter > 0.0 and float(np.mean(np.abs(b.dp))) > 0.0
         if self.plugged:
-            hats = np.clip(1.0 - np.abs(b.x * 10.0 - np.arange(NODES)[:, None]), 0.0, 1.0)
-            columns += list(gain * dp * hats)
+            columns += list(_plug_columns(s, b.x, dp))
             spread = np.full((NODES, NODES), 1.0) + 0.2**2 * np.eye(NODES)
             full = np.zeros((FREE + NODES, FREE + NODES))
             full[:FREE, :FREE], full[FREE:, FREE:] = self.precision, np.linalg.inv(spread)
             self.precision = full
+        for i, (_, sure) in self.known.items():
+            self.precision[i, i] += sure
         matrix = np.stack(columns, axis=1)
+        steep = np.zeros_like(matrix)
+        steep[:, [0, 2, INERTIA]] = s.stroke
+        if self.plugged:
+            beside = (_plug_columns(s, b.x + side, dp) for side in (NEAR, -NEAR))
+            steep[:, FREE:] = np.subtract(*beside).T / (2.0 * NEAR)
+        kind = np.full(matrix.shape[1], STILL)
+        kind[2], kind[INERTIA] = MOVING, CHANGING
         length = max(run.stop - run.start for run in runs)
         sticky = b.sticky
-        self.R = np.zeros((len(runs), length, matrix.shape[1]))
+        self.R, slopes = np.zeros((2, len(runs), length, matrix.shape[1]))
         self.y, self.weight = np.zeros((2, len(runs), length))
         for k, run in enumerate(runs):
             n = run.stop - run.start
             self.R[k, :n], self.y[k, :n] = matrix[run], s.area * b.ps[run]
+            slopes[k, :n] = steep[run]
             self.weight[k, :n] = trust(v[run], sticky[run])
         self.rows = int(self.weight.sum()) - len(runs)
         self.width = b.width
-        self.floating = _sensor_noise(b, s, runs, gain)
-        self.kept: dict[float, tuple[Floats, Floats, float]] = {}
+        self.slopes, self.jitter = Slopes(tuple(kind.tolist()), slopes), position_noise(b)
+        self.blurred = self.jitter * _steepness(b, s, runs)
+        self.floating = _plug_noise(b, runs, gain)
+        self.kept: dict[float, tuple[Floats, Floats, float, Floats]] = {}
 
     def fits(self, T: float, noise: float) -> dict[float, _Fit]:
         """
@@ -189,11 +212,14 @@ class _Scan:
         """
         if T not in self.kept:
             self.kept[T] = self._normal(T)
-        H, g, yy = self.kept[T]
-        return {air: self._constrained(H, g, yy, noise, air) for air in (1.0, -1.0)}
+        H, g, yy, blur = self.kept[T]
+        A = H / noise + self.precision
+        A += np.diag(1e-9 * np.diag(A))
+        A -= believable(A, blur / noise)
+        return {air: self._constrained(A, g / noise, yy / noise, air) for air in (1.0, -1.0)}
 
-    def _normal(self, T: float) -> tuple[Floats, Floats, float]:
-        """Return the normal equations of all strokes; their free first values are taken out."""
+    def _normal(self, T: float) -> tuple[Floats, Floats, float, Floats]:
+        """Return the normal equations of all strokes, free starts taken out, and noise in them."""
         R, z = self.R, np.zeros_like(self.R)
         fade = (np.arange(R.shape[1]) == 0).astype(float)
         if T > 0.0:
@@ -212,48 +238,55 @@ class _Scan:
         zw = (z * w[:, :, None]).reshape(-1, z.shape[2])
         z, y = z.reshape(-1, z.shape[2]), y.ravel()
         yy = float(y @ (w.ravel() * y))
-        yy += self.rows * self.floating * (1.0 - _smoothing(self.width, T))
-        return zw.T @ z, zw.T @ y, yy
+        yy += self.rows * (self.blurred + self.floating * (1.0 - _smoothing(self.width, T)))
+        blur = self.jitter * noise_normal(self.slopes, w, fade, self.width, T)
+        return zw.T @ z, zw.T @ y, yy, blur
 
-    def _constrained(self, H: Floats, g: Floats, yy: float, noise: float, air: float) -> _Fit:
+    def _constrained(self, A: Floats, right: Floats, yy: float, air: float) -> _Fit:
         """Fit with a spring and a friction that push the right way."""
-        A, b = H / noise + self.precision, g / noise
-        A += np.diag(1e-12 * np.diag(A))
+        b = right.copy()
         least = 0.0
-        for i, stated in self.known.items():
-            known = 1.0 / (STATED * max(stated, 0.1)) ** 2
-            A[i, i] += known
-            b[i] += known * air * stated
-            least += known * stated**2
-        free = np.ones(len(g), bool)
-        theta = np.zeros(len(g))
+        for i, (stated, sure) in self.known.items():
+            b[i] += sure * air * stated
+            least += sure * stated**2
+        free = np.ones(len(b), bool)
+        theta = np.zeros(len(b))
         for _ in range(len(SIGNED) + 1):
-            theta = np.zeros(len(g))
+            theta = np.zeros(len(b))
             theta[free] = np.linalg.solve(A[np.ix_(free, free)], b[free])
             wrong = [i for i in SIGNED if free[i] and air * theta[i] < 0.0]
             if not wrong:
                 break
             free[min(wrong, key=lambda i: air * theta[i] * np.sqrt(A[i, i]))] = False
-        score = least + yy / noise - 2.0 * float(theta @ b) + float(theta @ A @ theta)
+        score = least + yy - 2.0 * float(theta @ b) + float(theta @ A @ theta)
         if not self.plugged:
             return _Fit(score, 0.0, 0.0)
         covariance = np.linalg.inv(A[np.ix_(free, free)])[-NODES:, -NODES:]
         return _Fit(score, float(theta[FREE:].mean()), float(np.sqrt(max(covariance.mean(), 0.0))))
 
 
-def _sensor_noise(b: Blocks, s: Settings, runs: list[slice], gain: Floats) -> float:
-    """Return the variance that noise of x1, p1, p2 puts into the force [N2]."""
-    thirds_x, thirds_p, quiet = [], [], steady(b)
-    for run in runs:
-        thirds_x.append(np.diff(b.x[run], 3))
-        thirds_p.append(np.diff(gain[run] * b.dp[run], 3) * (not quiet))
-    # the third difference of white noise has 20 times its variance
-    x = 1.4826 * float(np.median(np.abs(np.concatenate(thirds_x)))) / np.sqrt(20.0)
-    plug = 1.4826 * float(np.median(np.abs(np.concatenate(thirds_p)))) / np.sqrt(20.0)
+def _plug_columns(s: Settings, x: Floats, dp: Floats) -> Floats:
+    """Return the plug force by the nodes of its table, shape (nodes, n) [N]."""
+    hats = np.clip(1.0 - np.abs(x * 10.0 - np.arange(NODES)[:, None]), 0.0, 1.0)
+    found: Floats = plug_per_pascal(s, x) * dp * hats
+    return found
+
+
+def _steepness(b: Blocks, s: Settings, runs: list[slice]) -> float:
+    """Return the mean square of the slope of the force over the position [N2]."""
     moved = np.concatenate([b.x[run] for run in runs])
     force = np.concatenate([s.area * b.ps[run] for run in runs])
-    slope = float(np.polyfit(moved, force, 1)[0])
-    return float((slope * x) ** 2 + plug**2 / CALM)
+    slope = np.polyval(np.polyder(np.polyfit(moved, force, CURVED)), moved)
+    return float(np.mean(slope**2))
+
+
+def _plug_noise(b: Blocks, runs: list[slice], gain: Floats) -> float:
+    """Return the variance that noise of p1, p2 puts into the force [N2]."""
+    if steady(b):
+        return 0.0
+    thirds = np.concatenate([np.diff(gain[run] * b.dp[run], 3) for run in runs])
+    plug = 1.4826 * float(np.median(np.abs(thirds))) / np.sqrt(20.0)
+    return float(plug**2 / CALM)
 
 
 def _acceleration(b: Blocks) -> Floats:
@@ -266,13 +299,7 @@ def _acceleration(b: Blocks) -> Floats:
 
 def _smoothing(width: float, T: float) -> float:
     """Return the share of the variance of white noise that passes the lag."""
-    if T <= 0.0:
-        return 1.0
-    a = np.exp(-width / T)
-    keep = (1.0 - a) * T / width
-    first = 1.0 - keep
-    second = a * first + (1.0 - a) - (1.0 - keep)
-    return float(first**2 + second**2 / (1.0 - a * a))
+    return float(np.sum(lag_response(width, T, LONGEST) ** 2))
 
 
 def _refine(score: dict[float, float], at_lag: Callable[[float], float]) -> tuple[float, float]:
