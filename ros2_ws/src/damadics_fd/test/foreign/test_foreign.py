@@ -7,7 +7,7 @@ import pytest
 from damadics_fd.commands.commission.balance import find_balance
 from damadics_fd.commands.commission.breakaway import breakaway
 from damadics_fd.commands.commission.monitor import identify
-from damadics_fd.commands.commission.signals import gather
+from damadics_fd.commands.commission.signals import blocks, gather
 from damadics_fd.commands.commission.twin.constants import twin
 from damadics_fd.core.monitor import run
 from damadics_fd.core.settings import Settings
@@ -294,3 +294,27 @@ def test_a_twin_moves_as_the_valve_did(seed, other):
     again = simulate(scenario, rate=200.0, model=twin_of(constants, 'here'))['x1'][: 2 * half]
     error = (np.asarray(again) - columns['x1'])[half:]
     assert np.sqrt(np.mean(error**2)) < 0.015
+
+
+def test_a_twin_sticks_and_slips_where_the_valve_does():
+    """Slides it instead, faults are foretold sooner than they are found."""
+    build = kinds.random_valve(8501)
+    cv = courses.steps(900.0, 8501)
+    columns = foreign.simulate(build, cv, seed=8501)
+    sheet = foreign.sheet(build)
+    learned = [FaultFree('strokes', {name: c[:120_000] for name, c in columns.items()})]
+    model = twin_of(twin(identify(learned, Settings.for_mode('monitor', **sheet), sheet)), 'here')
+    p1, p2 = Sine(build.p1, 0.02 * build.p1, 0.1), Sine(build.p2, 0.01 * build.p2, 0.3)
+    scenario = Scenario(
+        'as commanded', 900.0, cv=Recorded(np.arange(len(cv)) * 0.005, cv), p1=p1, p2=p2
+    )
+    again = {name: c[: len(cv)] for name, c in dict(simulate(scenario, 200.0, model)).items()}
+    noise = build.noise_x * np.random.default_rng(1).standard_normal(len(cv))
+    again = again | {'x1': again['x1'] + noise, 'stamp': columns['stamp']}
+
+    def sticking(recorded):
+        last = {name: np.asarray(c)[120_000:] for name, c in recorded.items()}
+        b = blocks(gather([FaultFree('last', last)]), 0.1)
+        return float(np.mean(b.sticky[b.moving]))
+
+    assert sticking(again) > 0.75 * sticking(columns) > 0.5

@@ -28,7 +28,7 @@ from damadics_fd.core.settings.identified import FaultFree
 from damadics_fd.core.valve.parameters import Valve
 from damadics_fd.core.valve.pneumatics import TRANSDUCER_INPUT, TRANSDUCER_OUTPUT
 
-BRISTLE = 2e-5  # m by which the stem gives before it breaks away
+BRISTLE = 5e-6  # m by which the stem gives before it breaks away; with more, small slips slide
 STRIBECK = 1e-3  # m/s
 UNLIKE = 0.035  # of the air's movement: a positioner that leaves more is another one
 ALIKE = 1.1  # times what a curve of its own leaves
