@@ -4,8 +4,8 @@
 
 import numpy as np
 import pytest
-from damadics_fd.commands.commission.balance import find_balance
-from damadics_fd.commands.commission.breakaway import breakaway
+from damadics_fd.commands.commission.forces.balance import find_balance
+from damadics_fd.commands.commission.forces.breakaway import breakaway
 from damadics_fd.commands.commission.monitor import identify
 from damadics_fd.commands.commission.signals import blocks, gather
 from damadics_fd.commands.commission.twin.constants import twin

@@ -8,8 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from damadics_fd.commands.commission.balance import BLOCK, Balance, find_balance
-from damadics_fd.commands.commission.breakaway import breakaway
 from damadics_fd.commands.commission.checks import (
     check_directions,
     check_units,
@@ -17,6 +15,8 @@ from damadics_fd.commands.commission.checks import (
     ranges,
 )
 from damadics_fd.commands.commission.errors import CommissioningError
+from damadics_fd.commands.commission.forces.balance import BLOCK, Balance, find_balance
+from damadics_fd.commands.commission.forces.breakaway import breakaway
 from damadics_fd.commands.commission.limit import Limit, set_limit, watched
 from damadics_fd.commands.commission.signals import APART, Signals, blocks, gather
 from damadics_fd.commands.commission.tuning import tune

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The constants of the approximator for a valve, by the rules for another actuator."""
 
-from damadics_fd.commands.commission.balance import Balance
+from damadics_fd.commands.commission.forces.balance import Balance
 from damadics_fd.core.approximator.estimator import Estimator
 from damadics_fd.core.monitor import Chain
 from damadics_fd.core.result import Columns

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from damadics_fd.commands.commission.balance import Balance
-from damadics_fd.commands.commission.lag import trust
-from damadics_fd.commands.commission.regression import K
+from damadics_fd.commands.commission.forces.balance import Balance
+from damadics_fd.commands.commission.forces.lag import trust
+from damadics_fd.commands.commission.forces.regression import K
 from damadics_fd.core.settings import Settings
 from damadics_fd.core.signature.settings import SignatureSettings
 

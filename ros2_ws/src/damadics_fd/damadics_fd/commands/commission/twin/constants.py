@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from damadics_fd.commands.commission.breakaway import SHORT, breakaway
 from damadics_fd.commands.commission.errors import CommissioningError
+from damadics_fd.commands.commission.forces.breakaway import SHORT, breakaway
 from damadics_fd.commands.commission.monitor import Proposal
 from damadics_fd.commands.commission.signals import Signals, blocks, gather
 from damadics_fd.commands.commission.twin.positioner import (

@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from damadics_fd.commands.commission.breakaway import SHORT
-from damadics_fd.commands.commission.lag import Mask
+from damadics_fd.commands.commission.forces.breakaway import SHORT
+from damadics_fd.commands.commission.forces.lag import Mask
 from damadics_fd.commands.commission.signals import GAP, Signals, blocks
 from damadics_fd.core.approximator.transmitter import delay_column
 from damadics_fd.core.jit import jit

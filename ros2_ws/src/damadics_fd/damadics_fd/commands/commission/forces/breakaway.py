@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from damadics_fd.commands.commission.lag import Mask, plug_per_pascal
+from damadics_fd.commands.commission.forces.lag import Mask, plug_per_pascal
 from damadics_fd.commands.commission.signals import Blocks, Signals, blocks
 from damadics_fd.core.record import Floats
 from damadics_fd.core.settings import Settings

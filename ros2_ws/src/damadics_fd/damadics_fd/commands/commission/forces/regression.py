@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from damadics_fd.commands.commission.lag import STRIBECK, Mask, plug_per_pascal
+from damadics_fd.commands.commission.forces.lag import STRIBECK, Mask, plug_per_pascal
 from damadics_fd.commands.commission.signals import Blocks, calm
 from damadics_fd.core.record import Floats
 from damadics_fd.core.settings import Settings

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from damadics_fd.commands.commission.errors import CommissioningError
-from damadics_fd.commands.commission.lag import (
+from damadics_fd.commands.commission.forces.lag import (
     SIGN_GAIN,
     WIDTH,
     Lag,
@@ -20,7 +20,7 @@ from damadics_fd.commands.commission.lag import (
     find_lag,
     trust,
 )
-from damadics_fd.commands.commission.regression import (
+from damadics_fd.commands.commission.forces.regression import (
     ONE,
     TABLE,
     K,

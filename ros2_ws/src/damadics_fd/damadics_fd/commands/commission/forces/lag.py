@@ -16,7 +16,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from damadics_fd.commands.commission.blur import (
+from damadics_fd.commands.commission.forces.blur import (
     CHANGING,
     MOVING,
     STILL,
