@@ -10,6 +10,7 @@ from damadics_fd.core.jit import jit
 from damadics_fd.core.scada.judging.cusum import FRICTION_TEST, QUICK, R1, R2, TEST_RESIDUAL, TESTS
 from damadics_fd.core.scada.judging.leverage import more_unsure
 from damadics_fd.core.scada.judging.roughness import rougher
+from damadics_fd.core.scada.judging.spikes import reject_spikes
 from damadics_fd.core.scada.laws.stem_law import shrink
 from damadics_fd.core.scada.state import LAW, N_RESIDUALS, N_TESTS, MonitorState, Reference
 
@@ -23,9 +24,6 @@ SCALES = np.array([2 if test.block >= 30 else 1 for test in TESTS])  # of the ro
 # after the fault: by how quick the test is.
 CAPS = (3.0, 1.2, 1.05)
 ONE_SAMPLE = 0.8  # of a limit, the most that a single sample brings
-JUMP = 6.0  # sigma from one sample to the next that may be a spike
-RETURNED = 0.3  # of a jump, by which the value may still be off when it has come back
-BACK = 4.0  # sigma within which it has come back
 # How long a residual must be testable in a row, without evidence, until its fault has gone.
 RECOVERY_S, FEWEST_GOOD = 60.0, 30  # s, samples
 # A fault that shows now and then, as when the stem turns, must stay away longer every time.
@@ -46,45 +44,6 @@ def silence(s: MonitorState) -> None:
     s.ratios[:] = 0.0
     s.good[:] = 0
     s.jumped[:] = 0
-
-
-@jit
-def taken_back(s: MonitorState, ref: Reference) -> bool:
-    """Tell whether a signal jumped with the sample before and has come back with this one."""
-    for i in range(1, 5):
-        there = abs(s.last[1, i] - s.last[2, i])
-        if there > ref.spike[i] > 0.0 and abs(s.last[0, i] - s.last[2, i]) < RETURNED * there:
-            return True
-    return False
-
-
-@jit
-def reject_spikes(s: MonitorState, ref: Reference) -> None:
-    """Take back what a single sample brought that has come back at the next one."""
-    back = taken_back(s, ref)
-    for r in range(N_RESIDUALS):
-        value = s.residual[r]
-        jumped = s.jumped[r]
-        far = False
-        for i in range(N_TESTS):
-            if TEST_RESIDUAL[i] != r or not ref.sd[i] > 0.0 or math.isnan(value):
-                continue
-            z = abs(value - ref.mu[i]) / (ref.sd[i] * rougher(s, ref, r, 1))
-            if jumped > 0 and (back or z < BACK):
-                for j in range(N_TESTS):
-                    if TEST_RESIDUAL[j] == r:
-                        s.g[j, 0] = s.saved[j, 0]
-                        s.g[j, 1] = s.saved[j, 1]
-                s.spikes[r] += 1
-                jumped = 0
-            if jumped == 0 and z > JUMP:
-                far = s.g[i, 0] < ref.h[i] and s.g[i, 1] < ref.h[i]
-                for j in range(N_TESTS):
-                    if TEST_RESIDUAL[j] == r:
-                        s.saved[j, 0] = s.g[j, 0]
-                        s.saved[j, 1] = s.g[j, 1]
-            break  # the first test of a residual judges the jump
-        s.jumped[r] = 1 if far else 0
 
 
 @jit
@@ -131,7 +90,9 @@ def decide(s: MonitorState, ref: Reference) -> None:
                 if g <= 0.0:
                     g = 0.0
                     s.zero[i, side] = s.t
-                    s.stretch[i, side, :] = 0.0
+                    s.stretch[i, side, 0] = 0.0
+                    s.stretch[i, side, 1] = 0.0
+                    s.stretch[i, side, 2] = 0.0
                 s.g[i, side] = min(
                     g, CAPS[0 if ref.k[i] > 1.0 else 1 if ref.k[i] >= QUICK else 2] * ref.h[i]
                 )

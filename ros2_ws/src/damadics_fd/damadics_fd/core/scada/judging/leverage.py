@@ -37,10 +37,11 @@ def more_unsure(s: MonitorState, i: int, side: int, away: float) -> float:
     :return: standard errors of the sum beyond those of samples in the middle; 0 where the stretch
         comes back towards the middle, so that evidence never grows from that.
     """
-    stretch = s.stretch[i, side]
-    stretch[0] += 1.0
-    stretch[1] += away
-    n, total = stretch[0], stretch[1]
-    more: float = max(math.sqrt(n * n + total * total) - n - stretch[2], 0.0)
-    stretch[2] += more
+    n = s.stretch[i, side, 0] + 1.0  # element by element: a view costs more than all the rest
+    total = s.stretch[i, side, 1] + away
+    cost = s.stretch[i, side, 2]
+    more: float = max(math.sqrt(n * n + total * total) - n - cost, 0.0)
+    s.stretch[i, side, 0] = n
+    s.stretch[i, side, 1] = total
+    s.stretch[i, side, 2] = cost + more
     return more

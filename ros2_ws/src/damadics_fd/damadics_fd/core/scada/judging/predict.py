@@ -21,6 +21,7 @@ from damadics_fd.core.scada.judging.pressure import (
     predict_pressure,
     push,
 )
+from damadics_fd.core.scada.judging.spikes import cv_came_back
 from damadics_fd.core.scada.laws.actuator import nominal_flow
 from damadics_fd.core.scada.laws.flow_law import characteristic, sizing
 from damadics_fd.core.scada.laws.stem_law import advance_track, position
@@ -154,6 +155,8 @@ def predict(
     if stood_still and s.repeats == 0:
         bridge(s, ref, t)
         s.t_flow = max(s.t_flow, t + METER_LAGS * max(ref.flow_law.lag_s, ref.period))
+    if cv_came_back(s, ref):
+        bridge(s, ref, t)
     if not repeated(s) and not stands_still(s, ref):
         advance_track(s.track, ref.stem_law, t, cv)
     law = ref.stem_kind == LAW
