@@ -16,6 +16,7 @@ import rclpy
 from damadics_bringup.processes import Processes, free_domain, surroundings
 from damadics_fd.ros import qos
 from damadics_msgs.msg import Measurement
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.context import Context
 from rclpy.experimental import EventsExecutor
 from rclpy.qos import QoSProfile
@@ -56,6 +57,26 @@ class Peer:
         while not condition() and time.monotonic() < deadline:
             self.executor.spin_once(timeout_sec=0.02)
         return bool(condition())
+
+    def await_met(self, *nodes: str) -> None:
+        """
+        Wait until nodes have met each other, which nobody else is told of.
+
+        What one of them publishes before is lost; each has had a second to find the others when
+        it reports on itself once more.
+        """
+        told: list[str] = []
+        heard = self.node.create_subscription(
+            DiagnosticArray,
+            '/diagnostics',
+            lambda message: told.extend(
+                status.name.partition(':')[0] for status in message.status
+            ),
+            qos.DIAGNOSTICS,
+        )
+        assert self.wait(lambda: all(told.count(node) >= 2 for node in nodes)), told
+        self.wait(lambda: False, promised(0.5))
+        self.node.destroy_subscription(heard)
 
     def call(self, kind, name: str, wait=None, **request):
         """Call a service and return its answer; `wait`, as of the peer, lets samples go on."""

@@ -49,7 +49,7 @@ def chain(processes, peer):
             and peer.got['fault_flag']
         ),
     ), 'the nodes did not start'
-    peer.wait(lambda: False, promised(0.5))  # until the nodes have met each other
+    peer.await_met('estimator', 'detector')
     return peer
 
 

@@ -7,7 +7,6 @@ long a stored trend takes to its limit.
 
 import numpy as np
 import pytest
-from conftest import promised
 from damadics_bringup.processes import parameters
 from damadics_fd.core.decision.alarm import NE107
 from damadics_fd.core.monitor import run
@@ -49,7 +48,7 @@ def await_chain(peer):
         ),
         60.0,
     ), 'no node started'
-    peer.wait(lambda: False, promised(0.5))
+    peer.await_met('estimator', 'detector')
 
 
 def stamp_of(message) -> int:
@@ -110,7 +109,6 @@ def restart(peer, processes, *names):
     for name in names:
         processes.start('damadics_fd', name, parameters(**QUICK))
     await_chain(peer)
-    peer.wait(lambda: False, promised(2.0))  # the estimator, too, has to find the new detector
 
 
 def test_a_restarted_detector_explains_a_fault_at_once(chain, processes):
