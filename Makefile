@@ -4,6 +4,8 @@ SHELL := /bin/bash
 PYTHON ?= python3
 ARGS ?=
 SEEDS ?= 1
+# as the executables have it (damadics_fd/start.py)
+export OPENBLAS_NUM_THREADS ?= 1
 ENV := source ./env.sh
 BUILT := ros2_ws/install/.built
 COMPILED := ros2_ws/install/.compiled

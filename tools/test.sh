@@ -4,7 +4,6 @@
 # What is given is passed on to pytest.
 set -uo pipefail
 cd "$(dirname "$0")/.."
-export OPENBLAS_NUM_THREADS=${OPENBLAS_NUM_THREADS:-1} # as the executables have it
 
 stream() {
   local name=$1 which=$2

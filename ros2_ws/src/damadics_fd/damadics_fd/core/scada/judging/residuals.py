@@ -78,6 +78,7 @@ def residuals(
         s.lasting = DOUBT * STEM_LASTING * hours_unseen(ref)
         s.away[0] = 0.0
         s.lever[0] = 1.0
+        s.air_doubt = 0.0
     else:
         for i in range(N_WEIGHTS):
             correction += ref.w[i] * s.phi[i]
