@@ -182,6 +182,8 @@ SENTENCES = {
     'why a valve is not commissioned well': (
         verdict.parts_differ,
         verdict.another_valve,
+        verdict.another_plug,
+        verdict.unchecked,
         checks.dead_signals,
         commission_monitor._limited,
         commission_scada._missed,

@@ -70,18 +70,31 @@ def test_a_spring_that_is_not_the_stated_one_is_never_ok(recording, stated, told
     assert not any('as stiff as stated' in r for r in propose(recording, sheet).limiting)
 
 
-def test_what_no_recording_can_check_of_the_sheet_is_told(recording):
-    stated = {'stroke', 'area'}
-    for wrong in (SHEET.replace(stroke=1.6 * SHEET.stroke), SHEET.replace(area=1.6 * SHEET.area)):
-        remarks = propose(recording, wrong, stated).remarks
-        assert any('taken from the settings, which no recording' in r for r in remarks), remarks
-        true = wrong.replace(stiffness=1.25 * 60892.0)
-        found = propose(recording, true, stated | {'stiffness'})
-        assert found.verdict != 'ok'
-        assert any('times as stiff as stated' in r for r in found.limiting), found.limiting
-    right = propose(recording, SHEET.replace(stiffness=1.25 * 60892.0), stated | {'stiffness'})
-    told = right.limiting + right.remarks
-    assert not any('as stated' in r or 'taken from' in r for r in told), told
+@pytest.mark.parametrize('name', ['stroke', 'area'])
+@pytest.mark.parametrize('share', [0.7, 1.3])
+def test_what_no_recording_can_check_of_the_sheet_is_never_ok(recording, name, share):
+    stated, spring = {'stroke', 'area'}, 1.25 * 60892.0
+    wrong = SHEET.replace(**{name: share * getattr(SHEET, name)})
+    found = propose(recording, wrong, stated)
+    assert found.verdict != 'ok'
+    assert any('the data sheet alone tells' in r for r in found.limiting), found.limiting
+    found = propose(recording, wrong.replace(stiffness=spring), stated | {'stiffness'})
+    assert found.verdict != 'ok'
+    assert any('times as stiff as stated' in r for r in found.limiting), found.limiting
+
+
+def test_a_sheet_with_the_right_spring_needs_no_word(recording):
+    right = SHEET.replace(stiffness=1.25 * 60892.0)
+    found = propose(recording, right, {'stroke', 'area', 'stiffness'})
+    told = found.limiting + found.remarks
+    assert not any('as stated' in r or 'sheet alone' in r for r in told), told
+
+
+def test_constants_that_nobody_stated_are_those_of_the_default_valve_or_limited(recording):
+    found = propose(recording)
+    assert any('that of the default valve' in r for r in found.limiting), found.limiting
+    own = propose(valve(200.0, friction=0.0108))
+    assert not any('stiff' in r for r in own.limiting + own.remarks), own.limiting
 
 
 def test_nominal_valve_gets_about_the_specified_constants():

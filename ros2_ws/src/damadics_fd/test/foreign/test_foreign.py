@@ -2,8 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Valves that are not the model inside: what commission finds of them, and what is monitored."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from damadics_fd.commands.commission import verdict
 from damadics_fd.commands.commission.forces.balance import find_balance
 from damadics_fd.commands.commission.forces.breakaway import breakaway
 from damadics_fd.commands.commission.monitor import identify
@@ -184,6 +187,21 @@ def test_stated_deviations_cover_the_truth():
             if not np.isnan(t.size) and not abs(t.size - t.true) <= 2.0 * t.std:
                 missed.append((seed, fault, t.size, t.std))
     assert len(missed) <= 2, missed
+
+
+def test_a_plug_or_an_area_that_is_not_the_sheets_is_told():
+    build = kinds.random_valve(31)
+    b = balance(build, 31, minutes=5.0)
+    sheet = Settings.for_mode('monitor', **foreign.sheet(build))
+    stated = {'stroke', 'area', 'stiffness', 'plug_diameter'}
+    for share, told in ((1.0, False), (1.2, False), (0.8, False), (1.3, True), (0.7, True)):
+        found = verdict.another_plug(replace(b, gain=share, plug=share * b.plug), sheet, stated)
+        assert bool(found) is told, (share, found)
+    balanced = replace(b, gain=0.15, plug=0.15 * b.plug)
+    assert verdict.another_plug(balanced, sheet, stated) == []
+    for found, names in ((b, 'stroke'), (balanced, 'stroke, area')):
+        told = verdict.unchecked(found, sheet, {'stroke', 'area'})
+        assert told[0].startswith(f'the data sheet alone tells {names}:')
 
 
 @pytest.mark.parametrize('wrong', ['stroke', 'stiffness', 'area', 'everything'])

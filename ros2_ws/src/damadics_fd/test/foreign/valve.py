@@ -291,10 +291,11 @@ def simulate(valve, cv, course=None, seed=0, rate=200.0, dt=5e-4):
 
 
 def sheet(valve, **changes):
-    """Return what the data sheet says: geometry, not friction, table or transmitters."""
+    """Return what the data sheet says: geometry, spring, not friction, table, transmitters."""
     return {
         'stroke': valve.stroke,
         'area': valve.area,
+        'stiffness': valve.stiffness,
         'mass': valve.mass,
         'plug_diameter': valve.plug_diameter,
         'supply_pressure': valve.supply,

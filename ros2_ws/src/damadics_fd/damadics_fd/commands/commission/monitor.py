@@ -24,6 +24,7 @@ from damadics_fd.commands.commission.verdict import (
     GOOD_FRICTION,
     GOOD_SPRING,
     Found,
+    another_plug,
     another_valve,
     hidden_friction,
     parts_differ,
@@ -167,6 +168,8 @@ def _propose(
         limiting.append(missed)
     limiting += parts_differ(balance)
     limiting += another_valve(balance, sheet, given)
+    limiting += another_plug(balance, sheet, given)
+    limiting += unchecked(balance, sheet, given)
     if result.detections:
         first = (result.detections[0].stamp - int(columns['stamp'][0])) * 1e-9
         limiting.append(
@@ -181,7 +184,6 @@ def _propose(
             'see to the packing, or to a positioner that hunts'
         )
     remarks += sheet_differs(balance, sheet, given)
-    remarks += unchecked(balance, given)
     remarks += [f'not determined: {name}' for name in balance.undetermined]
     return Proposal(
         settings,

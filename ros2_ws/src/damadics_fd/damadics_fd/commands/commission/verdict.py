@@ -18,7 +18,11 @@ CERTAIN = 4.0  # standard deviations
 SHEET = 0.05  # share by which a stated constant may be off without a word
 ANOTHER = 0.2  # share by which no spring is off its data sheet
 TELLING_PLUG = 0.2  # of the spring force over the stroke: a plug force that tells the area
-OTHER_PLUG = 1.4  # factor on the plug force beyond which it is not that of the sheet
+SAME_PLUG = 1.1  # factor on the plug force within which it confirms the area
+OTHER_PLUG = 1.27  # factor on the plug force beyond which it is not that of the sheet
+BALANCED = 0.5  # of the plug force of the sheet: less is left by a trim that is balanced
+SIZES = ('stroke', 'area', 'stiffness')
+DEFAULT = Settings.for_mode('monitor')
 REFERENCE = 2.0  # inflation of the variance of the reference, as in the signature
 GOOD_FRICTION, GOOD_SPRING = 1.0, 0.2  # smallest changes found of a valve that is not limited
 FREE = 2e-3  # of the spring force: friction of a valve that hardly has any
@@ -142,25 +146,65 @@ def sheet_differs(b: Balance, sheet: Settings, given: Collection[str]) -> list[s
 
 def another_valve(b: Balance, sheet: Settings, given: Collection[str]) -> list[str]:
     """
-    Tell where the stated spring is so far from the one found that the data sheet is another's.
+    Tell where the spring is so far from the one found that the constants are another valve's.
 
     Stiffness is found as force over way: a wrong stroke or area shifts it as a wrong spring does.
 
     :param b: the balance.
     :param sheet: what was stated.
     :param given: names of what was stated.
-    :return: a sentence, none where it fits or no stiffness was stated.
+    :return: a sentence, none where it fits or where no stiffness belongs to stroke and area.
     """
     share = b.settings.stiffness / sheet.stiffness
-    if 'stiffness' not in given or 1.0 - ANOTHER <= share <= 1.0 + ANOTHER:
+    if 1.0 - ANOTHER <= share <= 1.0 + ANOTHER:
         return []
+    if 'stiffness' in given:
+        return [
+            f'the spring is {share:.2f} times as stiff as stated: stroke, area or stiffness is '
+            'not that of this valve, and sizes in N and mm are off; changes are told as shares'
+        ]
+    if _of_default(sheet):
+        return [
+            f'the spring is {share:.2f} times as stiff as that of the default valve, whose stroke '
+            'and area were taken: state stroke, area and stiffness of this one; sizes in N and mm '
+            'are off, changes are told as shares'
+        ]
+    return []
+
+
+def _of_default(sheet: Settings) -> bool:
+    return all(getattr(sheet, name) == getattr(DEFAULT, name) for name in SIZES)
+
+
+def _telling(b: Balance) -> bool:
+    """Tell whether the plug force of the sheet is so large that it compares with the area."""
+    by_sheet = b.plug / max(b.gain, 1e-9)
+    return by_sheet > TELLING_PLUG * b.settings.stiffness * b.settings.stroke
+
+
+def another_plug(b: Balance, sheet: Settings, given: Collection[str]) -> list[str]:
+    """
+    Tell where the plug force is so far from the table that it is another plug's.
+
+    Where the spring fits, the area can only be wrong together with the stroke. Much less than the
+    table says is a balanced trim.
+
+    :param b: the balance.
+    :param sheet: what was stated.
+    :param given: names of what was stated.
+    :return: a sentence, none where it fits or no stiffness was stated.
+    """
+    fits = 1.0 / OTHER_PLUG <= b.gain <= OTHER_PLUG
+    if 'stiffness' not in given or not _telling(b) or fits or b.gain < BALANCED:
+        return []
+    diameter = sheet.plug_diameter * float(np.sqrt(b.gain))
     return [
-        f'the spring is {share:.2f} times as stiff as stated: stroke, area or stiffness is not '
-        'that of this valve, and sizes in N and mm are off; changes are told as shares'
+        f'the plug force is {b.gain:.2f} of what plug_diameter and plug_table say: the plug is '
+        f'another one (then state plug_diameter={diameter:.3g}), or stroke and area are off alike'
     ]
 
 
-def unchecked(b: Balance, given: Collection[str]) -> list[str]:
+def unchecked(b: Balance, sheet: Settings, given: Collection[str]) -> list[str]:
     """
     Name what is taken from the settings because no recording can check it.
 
@@ -168,18 +212,18 @@ def unchecked(b: Balance, given: Collection[str]) -> list[str]:
     stated stiffness tells the stroke, a plug force as the sheet has it tells the area.
 
     :param b: the balance.
+    :param sheet: what was stated.
     :param given: names of what was stated.
-    :return: a sentence, none where the stiffness is stated.
+    :return: a sentence, none where there is a stiffness to compare with.
     """
-    if 'stiffness' in given:
+    if 'stiffness' in given or _of_default(sheet):
         return []
-    telling = b.plug > TELLING_PLUG * b.settings.stiffness * b.settings.stroke
-    area_fits = telling and 1.0 / OTHER_PLUG <= b.gain <= OTHER_PLUG
-    taken = 'the stroke is' if area_fits else 'stroke and area are'
+    fits = _telling(b) and 1.0 / SAME_PLUG <= b.gain <= SAME_PLUG
+    names = 'stroke' if fits else 'stroke, area'
     return [
-        f'{taken} taken from the settings, which no recording checks: state the stiffness of the '
-        'spring too (--set stiffness=N/m); N/m and mm are as good as they, changes told as shares '
-        'are right in any case'
+        f'the data sheet alone tells {names}: state the stiffness of the spring too '
+        '(--set stiffness=N/m), which checks it; until then sizes in N, N/m and mm are as good as '
+        'the sheet, while alarms, causes and changes as shares do not depend on it'
     ]
 
 
