@@ -2,9 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where the executables begin: before the imports that take seconds and may fail."""
 
+import contextlib
 import os
+import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from importlib import import_module
 from pathlib import Path
 
@@ -52,15 +54,31 @@ def run_node(module: str) -> int:
 
 
 def _main(module: str) -> int:
-    try:
+    with ended_by_ctrl_c():
         problem = missing_middleware()
         if problem:
             print(problem, file=sys.stderr)
             return 2
         main: Callable[[], int] = import_module(module).main
-    except KeyboardInterrupt:
-        return INTERRUPTED
     return main()
+
+
+@contextlib.contextmanager
+def ended_by_ctrl_c() -> Iterator[None]:
+    """
+    Have Ctrl-C end the process at once, with code 130 and without a word.
+
+    An exception would not do while libraries are imported: they try what is installed, and some
+    go on after any exception. Nothing is open yet that would have to be closed.
+    """
+    if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield  # as in the background of a shell
+        return
+    signal.signal(signal.SIGINT, lambda *_: os._exit(INTERRUPTED))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def missing_middleware() -> str:
