@@ -50,6 +50,21 @@ def pipeline() -> None:
     run({'stamp': np.array([1]), **columns}, Settings.for_mode('paper'))
 
 
+def control_room() -> None:
+    """Compile what learns and judges a recording in mode scada."""
+    from damadics_fd.core.monitor import run
+    from damadics_fd.core.sample import SIGNALS
+    from damadics_fd.core.settings import Settings
+    from damadics_plant import simulate
+
+    day = simulate('random_nominal', rate=1.0, noise=True, duration=1200.0)
+    columns = {name: np.array(day[name]) for name in SIGNALS}
+    run(
+        {'stamp': np.arange(len(columns['cv'])) * 1_000_000_000, **columns},
+        Settings.for_mode('scada'),
+    )
+
+
 def bank(mode: str) -> None:
     """Compile the loop over rows of many valves, which is made of the same steps."""
     from damadics_fd.core.bank.bank import Bank
@@ -106,6 +121,7 @@ STAGES: dict[str, list[list[Task]]] = {  # the tasks of an inner list go on at t
             (bank, ('scada',)),
             (pair, ()),
             (lugre, ()),
+            (control_room, ()),
             (imports, MORE_EXECUTABLES),
         ],
     ],
