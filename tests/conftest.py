@@ -6,7 +6,9 @@ import contextlib
 import os
 import random
 import socket
+import subprocess
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -108,6 +110,16 @@ class Peer:
         self.executor.shutdown()
         self.node.destroy_node()
         self.context.try_shutdown()
+
+
+@contextlib.contextmanager
+def ended(process: subprocess.Popen) -> Iterator[subprocess.Popen]:
+    """Let a test use a process that does not outlive it, also where the test fails."""
+    with process:
+        try:
+            yield process
+        finally:
+            process.kill()
 
 
 class Child(NamedTuple):

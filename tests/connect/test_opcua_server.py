@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 from asyncua import Client, Server, ua
-from conftest import PATIENCE, free_port
+from conftest import PATIENCE, ended, free_port
 from connect.detectors import Detectors
 from connect.servers import listens, wait_for
 from damadics_bringup.processes import executable
@@ -146,20 +146,21 @@ def test_a_wrong_token_does_not_enter(served):
 def test_a_foreign_stack_reads_and_hears_the_same(served):
     url, detectors, log = served
     assert wait_for(lambda: 'serving judgements' in log.read_text())
-    reader = subprocess.Popen(
+    begun = subprocess.Popen(
         ['node', str(FOREIGN / 'read.mjs'), url, VIEWER],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
     )
-    for line in reader.stdout:  # the stack talks, too
-        if line == 'listening\n':
-            break
-    else:
-        pytest.fail(reader.stderr.read())
-    detectors.judge('lv101', FaultEvent.RAISED, 'friction up')
-    out, problem = reader.communicate(timeout=PATIENCE)
-    assert reader.returncode == 0, problem
+    with ended(begun) as reader:
+        for line in reader.stdout:  # the stack talks, too
+            if line == 'listening\n':
+                break
+        else:
+            pytest.fail(reader.stderr.read())
+        detectors.judge('lv101', FaultEvent.RAISED, 'friction up')
+        out, problem = reader.communicate(timeout=PATIENCE)
+        assert reader.returncode == 0, problem
     told = json.loads(next(line for line in out.splitlines() if line.startswith('{')))
     assert told['browse'] == 'LV101' and told['type'] == 'PADIMType'
     assert told['event']['message'] == 'friction up'

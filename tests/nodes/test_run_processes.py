@@ -10,7 +10,7 @@ import time
 from pathlib import Path
 
 import pytest
-from conftest import PATIENCE, children
+from conftest import PATIENCE, children, ended
 from damadics_bringup.keeper import Keeper, Task
 from damadics_bringup.processes import Processes, executable
 
@@ -35,7 +35,7 @@ def wait_for(condition, patience: float = PATIENCE) -> bool:
 
 @pytest.mark.parametrize('number', [signal.SIGKILL, signal.SIGTERM, signal.SIGSEGV])
 def test_children_end_with_what_started_them(tmp_path, number):
-    parent = subprocess.Popen(
+    begun = subprocess.Popen(
         [
             sys.executable,
             '-c',
@@ -53,11 +53,12 @@ def test_children_end_with_what_started_them(tmp_path, number):
         stdout=subprocess.PIPE,
         text=True,
     )
-    started = [int(word) for word in parent.stdout.readline().split()]
-    assert len(started) == 3
-    assert all(map(alive, started))
-    parent.send_signal(number)
-    parent.wait(PATIENCE)
+    with ended(begun) as parent:
+        started = [int(word) for word in parent.stdout.readline().split()]
+        assert len(started) == 3
+        assert all(map(alive, started))
+        parent.send_signal(number)
+        parent.wait(PATIENCE)
     assert wait_for(lambda: not any(map(alive, started))), 'they run on'
 
 
@@ -185,13 +186,14 @@ def test_another_middleware_gets_a_sentence_with_the_remedy(domain):
 
 
 def test_an_interrupt_while_it_imports_leaves_no_traceback(domain):
-    process = subprocess.Popen(
+    begun = subprocess.Popen(
         [executable('damadics_fd', 'detector')], stderr=subprocess.PIPE, text=True
     )
-    maps = Path(f'/proc/{process.pid}/maps')
-    assert wait_for(lambda: 'numpy' in maps.read_text())
-    process.send_signal(signal.SIGINT)
-    _, said = process.communicate(timeout=PATIENCE)
+    with ended(begun) as process:
+        maps = Path(f'/proc/{process.pid}/maps')
+        assert wait_for(lambda: 'numpy' in maps.read_text())
+        process.send_signal(signal.SIGINT)
+        _, said = process.communicate(timeout=PATIENCE)
     assert 'Traceback' not in said
 
 
