@@ -250,11 +250,20 @@ def test_missing_samples_cost_blocks_not_truth():
 
 
 def test_slow_ramps_are_not_taken_for_a_loss_of_supply():
-    s = Signature(C).state[0]
-    s.air_ring[st.FILL] = 0.88, 0.87, 0.86, 0.89, 0.88
-    assert strokes_agree(s)
-    s.air_ring[st.FILL] = 0.80, 0.64, 0.87, 0.77, 0.63  # the positioner did not open fully
-    assert not strokes_agree(s)
+    signature = Signature(C)
+    s, c = signature.state[0], signature.record[0]
+    s.air_ring[st.FILL, st.RATE] = 0.88, 0.87, 0.86, 0.89, 0.88
+    assert strokes_agree(s, c)
+    s.air_ring[st.FILL, st.RATE] = 0.88, 0.87, 0.86, 0.64, 0.88  # one was too short
+    assert strokes_agree(s, c)
+    s.air_ring[st.FILL, st.RATE] = (
+        0.80,
+        0.64,
+        0.87,
+        0.77,
+        0.63,
+    )  # the positioner did not open fully
+    assert not strokes_agree(s, c)
 
 
 def test_no_chamber_pressure_no_signature():

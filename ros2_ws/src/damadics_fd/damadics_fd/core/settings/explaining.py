@@ -45,5 +45,10 @@ class Explaining(Section):
         '', 'change of stiffness that asks for maintenance', 0.0, 1.0, 0.02, modes=MONITOR
     )
     material_supply: float = number(
-        '', 'loss of supply pressure that alarms, as a share', 0.01, 0.9, 0.13, modes=MONITOR
+        '',
+        'loss of supply pressure that alarms, as a share; a slow one is 1.7 times as large',
+        0.01,
+        0.9,
+        0.14,
+        modes=MONITOR,
     )

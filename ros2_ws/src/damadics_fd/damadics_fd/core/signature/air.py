@@ -5,26 +5,23 @@ Air supply: the top rate at which the chamber fills and vents, against the learn
 
 A positioner far from its set-point opens fully, so the best strokes show the capacity of the
 air supply whatever the valve does. With less supply pressure the chamber fills slower and vents
-as before; a leak of the chamber fills it slower and vents it faster.
+as before; a leak of the chamber fills it slower and vents it faster. What supply pressure a rate
+means: see `supply`.
 """
 
 import math
 
-import numpy as np
-
 from damadics_fd.core.jit import jit
 from damadics_fd.core.record import Floats
 from damadics_fd.core.signature.settings import SignatureSettings
-from damadics_fd.core.signature.state import FILL, STROKES, VENT, Air, State
+from damadics_fd.core.signature.state import FILL, PS, RATE, STROKES, VENT, WHEN, Air, State
+from damadics_fd.core.signature.supply import P_ATM, elsewhere, law_of, note_law, note_level
 
-P_ATM = 101325.0  # [Pa]
 ALIKE = 0.9  # [1] strokes at full opening differ by 4 % at most, those of ramps by 10 to 40 %
-ELSEWHERE = 0.4  # of the pressure of one stroke of the spring
+ELSEWHERE, ANYWHERE = 0.4, 1.0  # of one stroke of the spring: law of the flow not known, known
 P_FLOOR = 5e3  # [Pa] less driving pressure than this says nothing
-CHOKED = 0.3  # ratio of pressures below which the flow is sonic, ISO 6358
-SONIC = 0.85  # weight of the second of both laws of the flow
-AS_BEFORE = 0.05  # change of the top venting rate that is none
 MIN_STROKE = 0.15  # [1] a shorter stroke may not reach its top rate; holding against P1 does not
+MINUTES = 900 * 1_000_000_000  # [ns] within which a change of the supply came at once
 
 
 @jit
@@ -70,39 +67,58 @@ def track_air(s: State, c: SignatureSettings, learn: bool) -> bool:
 
 
 @jit
-def end_stroke(s: Air, c: SignatureSettings, learn: bool) -> bool:
+def end_stroke(s: State, c: SignatureSettings, learn: bool) -> bool:
     """
     Take the second best rate of a stroke into the reference or the latest strokes.
 
-    Both are the second best of the strokes; a stroke at another chamber pressure is left out.
+    A stroke at another chamber pressure is left out. The strokes before the latest are kept too.
 
     :param s: state record.
     :param c: settings record.
-    :param learn: True while what is seen may become the reference.
+    :param learn: True while there is no alarm, so that what is seen may become the reference.
     :return: True if the present rates are new.
     """
     way = s.air_way
-    if abs(s.air_moved) < MIN_STROKE:
+    if abs(s.air_moved) < MIN_STROKE or s.air_second <= 0.0:
         return False
+    if learn:
+        note_law(s, c, way, s.t)
     if s.air_learned[way] < STROKES:
         if learn:
-            s.air_ring[way, s.air_learned[way]] = s.air_second
-            s.air_ring_ps[way, s.air_learned[way]] = s.air_ps
+            keep(s, way, s.air_learned[way])
             s.air_learned[way] += 1
             refer(s, c, way)
         return False
-    if s.air_ref_ps[way] > 0.0 and abs(s.air_ps - s.air_ref_ps[way]) > ELSEWHERE * swing(c):
+    far = ELSEWHERE if law_of(s, way) < 0.0 else ANYWHERE
+    if s.air_ref_ps[way] > 0.0 and abs(s.air_ps - s.air_ref_ps[way]) > far * swing(c):
         return False  # another process pressure, another driving pressure: it does not compare
     slot = s.air_count[way] % STROKES
-    s.air_ring[way, slot] = s.air_second * elsewhere(c, way, s.air_ps, s.air_ref_ps[way])
-    s.air_ring_ps[way, slot] = s.air_ps
+    for k in range(3):
+        s.air_past[way, k, slot] = s.air_ring[way, k, slot]
+    keep(s, way, slot)
     s.air_count[way] += 1
     if s.air_count[way] < STROKES:
         return False
-    usual = second_best(s.air_ring[way], STROKES)
-    s.air_rate[way] = s.air_ring[way, usual] / s.air_ref[way]
-    s.air_rate_ps[way] = s.air_ring_ps[way, usual]
+    s.air_rate[way], s.air_rate_ps[way] = best_rate(s, c, way, s.air_ring[way])
+    if way == FILL and learn and s.air_past[way, WHEN].min() > 0.0:
+        before, ps = best_rate(s, c, way, s.air_past[way])
+        ago = s.t - s.air_past[way, WHEN].min()
+        note_level(s, c, before if 0.0 < ago < MINUTES else math.nan, ps)
     return True
+
+
+@jit
+def keep(s: State, way: int, slot: int) -> None:
+    """
+    Put the stroke that has ended into the ring of the latest ones.
+
+    :param s: state record.
+    :param way: FILL or VENT.
+    :param slot: place in the ring.
+    """
+    s.air_ring[way, RATE, slot] = s.air_second
+    s.air_ring[way, PS, slot] = s.air_ps
+    s.air_ring[way, WHEN, slot] = s.t
 
 
 @jit
@@ -117,38 +133,42 @@ def refer(s: Air, c: SignatureSettings, way: int) -> None:
     :param way: FILL or VENT.
     """
     n = s.air_learned[way]
-    middle = s.air_ring_ps[way, :n].mean()
-    rates = np.empty(n)
-    for i in range(n):
-        rates[i] = s.air_ring[way, i] * elsewhere(c, way, s.air_ring_ps[way, i], middle)
-    s.air_ref[way] = rates[second_best(rates, n)]
-    s.air_ref_ps[way] = middle
+    s.air_ref_ps[way] = s.air_ring[way, PS, :n].mean()
+    s.air_ref[way] = 1.0
+    s.air_ref[way] = best_rate(s, c, way, s.air_ring[way, :, :n])[0]
 
 
 @jit
-def elsewhere(c: SignatureSettings, way: int, ps: float, at: float) -> float:
+def best_rate(s: Air, c: SignatureSettings, way: int, ring: Floats) -> tuple[float, float]:
     """
-    Restate a rate per root of the driving pressure at another chamber pressure.
+    Return the second best rate of some strokes and the chamber pressure at which it was taken.
 
-    A sonic flow does not follow that root: half-way between the two laws, see `supply_change`.
-
+    :param s: state record.
     :param c: settings record.
     :param way: FILL or VENT.
-    :param ps: [Pa] chamber pressure at which the rate was taken.
-    :param at: [Pa] chamber pressure to compare at; 0 where it is not known.
-    :return: factor on the rate.
+    :param ring: rate, pressure and time of each of them, shape (3, n).
+    :return: [1] of the learned rate, at its chamber pressure; [Pa].
     """
-    if at <= 0.0:
-        return 1.0
-    supply = P_ATM + c.supply_pressure
-    if way == FILL:
-        here, there = flow_square(supply, P_ATM + ps), flow_square(supply, P_ATM + at)
-        drive_here, drive_there = c.supply_pressure - ps, c.supply_pressure - at
-    else:
-        here, there = flow_square(P_ATM + ps, P_ATM), flow_square(P_ATM + at, P_ATM)
-        drive_here, drive_there = ps, at
-    factor: float = (there * drive_here / (here * drive_there)) ** 0.25
-    return factor
+    rates = compared(s, c, way, ring)
+    best = second_best(rates, len(rates))
+    return rates[best] / s.air_ref[way], ring[PS, best]
+
+
+@jit
+def compared(s: Air, c: SignatureSettings, way: int, ring: Floats) -> Floats:
+    """
+    Restate the rates of some strokes at the chamber pressure of the reference.
+
+    :param s: state record.
+    :param c: settings record.
+    :param way: FILL or VENT.
+    :param ring: rate, pressure and time of each of them, shape (3, n).
+    :return: rates.
+    """
+    rates: Floats = ring[RATE].copy()
+    for i in range(len(rates)):
+        rates[i] *= elsewhere(s, c, way, ring[PS, i], s.air_ref_ps[way])
+    return rates
 
 
 @jit
@@ -182,126 +202,34 @@ def second_best(values: Floats, n: int) -> int:
 
 
 @jit
-def supply_lost(s: Air, c: SignatureSettings) -> bool:
-    """
-    Tell whether the chamber fills slower than learned while it vents as before.
-
-    :param s: state record.
-    :param c: settings record.
-    :return: True if it does, by a loss of pressure larger than the settings allow.
-    """
-    enough = s.air_count[FILL] >= STROKES and s.air_count[VENT] >= STROKES
-    if not enough or abs(s.air_rate[VENT] - 1.0) >= AS_BEFORE:
-        return False
-    lost: bool = supply_change(s, c) < -c.material_supply * c.supply_pressure
-    return lost
-
-
-@jit
-def strokes_agree(s: Air) -> bool:
+def strokes_agree(s: Air, c: SignatureSettings) -> bool:
     """
     Tell whether the latest strokes filled the chamber alike, as they do at full opening.
 
+    One of them may have been too short to open the positioner fully.
+
     :param s: state record; the ring of filling rates is full.
+    :param c: settings record.
     :return: False where the positioner followed slow ramps, which never open it.
     """
-    low = high = s.air_ring[FILL, 0]
-    for i in range(1, STROKES):
-        low = min(low, s.air_ring[FILL, i])
-        high = max(high, s.air_ring[FILL, i])
-    agree: bool = low > ALIKE * high
+    rates = compared(s, c, FILL, s.air_ring[FILL])
+    rates.sort()
+    agree: bool = rates[1] > ALIKE * rates[-1]
     return agree
-
-
-@jit
-def supply_change(s: Air, c: SignatureSettings) -> float:
-    """
-    Estimate the change of the supply pressure from the filling rate.
-
-    Where the passages of a positioner are sonic the flow follows the supply alone, where they
-    are not the root of the pressure difference; ISO 6358 lies between, and which of them are is
-    not known: a mean of both laws.
-
-    :param s: state record.
-    :param c: settings record.
-    :return: [Pa], negative for a loss.
-    """
-    change: float = (1.0 - SONIC) * by_root(s, c) + SONIC * by_sonic(s, c)
-    return change
-
-
-@jit
-def by_root(s: Air, c: SignatureSettings) -> float:
-    """
-    Estimate the change of the supply pressure, the flow being as the root of the difference.
-
-    :param s: state record.
-    :param c: settings record.
-    :return: [Pa], negative for a loss.
-    """
-    ps = s.air_rate_ps[FILL]
-    rate = s.air_rate[FILL] / elsewhere(c, FILL, ps, s.air_ref_ps[FILL])  # as it was taken
-    change: float = (rate * rate - 1.0) * (c.supply_pressure - ps)
-    return change
-
-
-@jit
-def by_sonic(s: Air, c: SignatureSettings) -> float:
-    """
-    Estimate the change of the supply pressure, the flow being that of ISO 6358.
-
-    :param s: state record.
-    :param c: settings record.
-    :return: [Pa], negative for a loss.
-    """
-    ps = s.air_rate_ps[FILL]
-    rate = s.air_rate[FILL] * elsewhere(c, FILL, ps, s.air_ref_ps[FILL])
-    whole = P_ATM + c.supply_pressure
-    change: float = supply_of(rate * rate * flow_square(whole, P_ATM + ps), P_ATM + ps) - whole
-    return change
-
-
-@jit
-def flow_square(up: float, down: float) -> float:
-    """
-    Return the square of the mass flow per conductance after ISO 6358.
-
-    :param up: [Pa] absolute pressure before the restriction.
-    :param down: [Pa] behind it.
-    :return: [Pa2].
-    """
-    beyond = max(down - CHOKED * up, 0.0) / (1.0 - CHOKED)
-    return up * up - beyond * beyond
-
-
-@jit
-def supply_of(square: float, down: float) -> float:
-    """
-    Invert `flow_square`.
-
-    :param square: [Pa2] of the flow.
-    :param down: [Pa] absolute pressure behind the restriction.
-    :return: [Pa] absolute pressure before it.
-    """
-    up = math.sqrt(square)
-    if down <= CHOKED * up:
-        return up
-    room = (1.0 - CHOKED) ** 2
-    a = room - CHOKED * CHOKED
-    b = CHOKED * down
-    return (math.sqrt(b * b + a * (down * down + square * room)) - b) / a
 
 
 @jit
 def restart_air(s: Air) -> None:
     """
-    Judge the rates on strokes to come only.
+    Judge the rates on strokes to come only; where the supply was before the alarm is remembered.
 
     :param s: state record.
     """
     for way in range(2):
         s.air_count[way] = 0
         s.air_rate[way] = math.nan
+        s.air_ring[way, WHEN, :] = 0.0
+        s.air_past[way, WHEN, :] = 0.0
 
 
 @jit
@@ -317,4 +245,7 @@ def forget_air(s: Air) -> None:
         s.air_learned[way] = 0
         s.air_ref[way] = 0.0
         s.air_ref_ps[way] = 0.0
+        s.air_last_t[way] = 0
+        s.air_law[way, :] = 0.0
+    s.air_above = 0.0
     restart_air(s)

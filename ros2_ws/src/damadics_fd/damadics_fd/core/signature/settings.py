@@ -88,7 +88,7 @@ class SignatureSettings(Section):
     material_spring: float = 0.02
     # supply pressure from the top speed
     supply_pressure: float = VALVE.supply_pressure  # [Pa]
-    material_supply: float = 0.13  # [1] loss of supply pressure, as a share
+    material_supply: float = 0.14  # [1] loss of supply pressure, as a share
     chamber_volume: float = VALVE.chamber_volume  # [m3] dead volume V0
     stroke: float = VALVE.stroke  # [m]
     # NAMUR NE 107 class of each of CAUSES

@@ -24,7 +24,10 @@ from damadics_fd.core.signature.state import (
 )
 
 UNKNOWN = ('air_rate', 'now', 'now_std')
-LATER: Saved = {'air_ref_ps': [0.0, 0.0]}  # what references of version 0.1 do not have
+LATER: Saved = {  # what older references do not have
+    'air_ref_ps': [0.0, 0.0],
+    'air_law': [[0.0] * 4] * 2,
+}
 
 
 @dataclass(frozen=True, slots=True)

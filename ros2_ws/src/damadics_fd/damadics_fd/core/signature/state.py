@@ -84,6 +84,7 @@ NO_CLASSES = (0,) * len(CAUSES)
 
 FILL, VENT = 0, 1  # ways of the chamber's air
 STROKES = 5  # strokes each way that show the top rate
+RATE, PS, WHEN = range(3)  # what is kept of a stroke
 SMALL_FRICTION = 1e-3  # [1] least friction that a share is taken of
 
 
@@ -240,8 +241,12 @@ class Air(Record):
     air_second: float
     air_ps: float
     air_count: Annotated[Ints, 2]
-    air_ring: Annotated[Floats, 2, STROKES]
-    air_ring_ps: Annotated[Floats, 2, STROKES]
+    air_ring: Annotated[Floats, 2, 3, STROKES]  # RATE, PS [Pa] and WHEN [ns] of the latest
+    air_past: Annotated[Floats, 2, 3, STROKES]  # of those before them
+    air_above: float  # [Pa] by which a loss counts from more than a slow one does
+    air_law: Annotated[Floats, 2, 4]  # sums over pairs of strokes: number, dg2, dg dy, dy2
+    air_last: Annotated[Floats, 2, 2]  # g and y of the last stroke, see `supply.note_law`
+    air_last_t: Annotated[Ints, 2]  # [ns] 0: none
     air_rate: Annotated[Floats, 2]
     air_rate_ps: Annotated[Floats, 2]
 
@@ -286,7 +291,7 @@ class State(
     work: Work
 
 
-SAVED = (*Reference.names(), 'air_learned', 'air_ref', 'air_ref_ps')
+SAVED = (*Reference.names(), 'air_learned', 'air_ref', 'air_ref_ps', 'air_law')
 
 
 def known(value: float, std: float, confidence: float) -> tuple[float, float, float]:

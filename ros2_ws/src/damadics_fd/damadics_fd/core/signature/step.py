@@ -5,7 +5,7 @@
 import math
 
 from damadics_fd.core.jit import jit, layer
-from damadics_fd.core.signature.air import strokes_agree, supply_lost, track_air
+from damadics_fd.core.signature.air import strokes_agree, track_air
 from damadics_fd.core.signature.blocks import (
     add_sample,
     break_run,
@@ -56,6 +56,7 @@ from damadics_fd.core.signature.state import (
     State,
 )
 from damadics_fd.core.signature.sums import accumulate, copy_sums, growth_time, residual
+from damadics_fd.core.signature.supply import supply_lost
 
 BREAK_AWAY = 2  # blocks of a stroke in which strong friction is still more than when sliding
 QUIET, BLOCK, CHANGED = 0, 1, 2  # what a step returns: nothing new, a block, a new judgement
@@ -223,7 +224,7 @@ def judge(s: State, c: SignatureSettings) -> int:
             and s.state == STATE_MONITOR
             and c.own_alarm
             and supply_lost(s, c)
-            and strokes_agree(s)
+            and strokes_agree(s, c)
         ):
             start_supply_alarm(s, c)
     return CHANGED if s.state * 10000 + s.family * 100 + s.cause != before else BLOCK
