@@ -29,6 +29,22 @@ def test_a_plant_that_has_been_running_for_long_is_no_fault(reference, air):
     assert math.exp(float(monitor.state.air)) == pytest.approx(air, abs=0.05)
 
 
+def test_a_little_air_is_found_when_there_is_more_to_look_at(reference):
+    monitor = ScadaMonitor(LATE, reference)
+    monitor.run_samples(driven(2300, seed=21, air=1.05))
+    assert math.exp(float(monitor.state.air)) == pytest.approx(1.05, abs=0.01)
+    assert monitor.state.air_doubt < 1.0
+
+
+def test_a_plant_that_has_been_running_is_learned_as_it_is(reference):
+    running = learn(driven(270, seed=1, air=1.1), SETTINGS)
+    assert math.exp(float(running['air'][0] - reference['air'][0])) == pytest.approx(1.1, abs=0.01)
+    assert running['s1'][0] == pytest.approx(reference['s1'][0], rel=0.05)
+    monitor = ScadaMonitor(LATE, running)
+    assert not monitor.run_samples(driven(900, seed=21, air=1.1))['alarm'].any()
+    assert float(monitor.state.air) == pytest.approx(0.0, abs=0.01)
+
+
 def test_what_was_found_is_kept_over_a_gap(reference):
     rows = driven(900, seed=22, air=1.25)
     monitor = ScadaMonitor(LATE, reference)

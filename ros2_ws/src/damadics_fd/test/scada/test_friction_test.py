@@ -29,3 +29,13 @@ def evidence(lever, samples=100):
 def test_a_small_misfit_is_friction_only_where_the_model_is_sure():
     assert evidence(lever=1.0) > 1.0
     assert evidence(lever=3.0) == pytest.approx(0.0)
+
+
+@pytest.mark.parametrize(('apart', 'slips'), [(50, 1), (5, 10)])
+def test_a_slip_counts_once_however_long_it_lasts(apart, slips):
+    llr = before = 0.0
+    for k in range(apart * slips):
+        llr, before = decide.weigh(llr, before, 4.0, 3.0)
+        if k % apart == apart - 1:
+            llr, before = decide.weigh(llr, before, 0.0, 0.0)
+    assert llr == pytest.approx(slips * decide.LLR_CLIP)

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from damadics_fd.core.scada.judging.air import STEP, vertex
 from damadics_fd.core.scada.judging.cusum import R1
 from damadics_fd.core.scada.judging.gap import GAP_PERIODS
 from damadics_fd.core.scada.judging.limits import (
@@ -48,6 +49,7 @@ STATED = 0.8  # share to which the stated actuator must cut the variance of an i
 # ... or equal it and leave no more than the sensors' noise
 NEARLY, SENSOR = 1.1, 1.5
 LEAST_SAMPLES = 200
+MOST_STEPS = 8  # with which the air is looked for
 PUSHED = 0.02  # gain of the bias beyond which the actuator is another one
 QUIET, SHIFTED = 0.02, 0.005  # of the stroke: a stem that hardly moves shows no gain, but a shift
 OFF = 1e9  # a limit that is never reached
@@ -198,6 +200,42 @@ def _choose_stem(
         ref.stem_kind = LAW
         ref.w[:] = 0.0
         ref.cv_jump = NEVER
+        return prediction
+    return _fit_air(ref, reference, clean, x, settings, window, prediction, used)
+
+
+def _fit_air(
+    ref: Reference,
+    reference: np.ndarray,
+    clean: Floats,
+    x: Floats,
+    settings: ScadaSettings,
+    window: np.ndarray,
+    prediction: Prediction,
+    used: int,
+) -> Prediction:
+    """
+    Fit the air with which the stated stem starts: that which leaves least of r1.
+
+    A plant may have been running for long, and noise of the pressures makes a stem with more air
+    the smoother, better one: what is looked for after a start is what differs from this.
+    """
+
+    def at(air: float) -> tuple[float, Prediction]:
+        ref.air = air
+        p = predicted(clean, settings, reference, window, bool(ref.hold))
+        return loss_of(_bias(p.phi, x - p.xm, used)[1]), p
+
+    least, air = loss_of(_bias(prediction.phi, x - prediction.xm, used)[1]), 0.0
+    for _ in range(MOST_STEPS):
+        before, after = at(air - STEP)[0], at(air + STEP)[0]
+        further = vertex(before, least, after, STEP)
+        air += further
+        least, prediction = at(air)
+        if abs(further) < STEP:
+            break
+    ref.w[:used], _ = _bias(prediction.phi, x - prediction.xm, used)
+    ref.x_mean, ref.x_sd = prediction.xm.mean(), max(prediction.xm.std(), 1e-3)
     return prediction
 
 

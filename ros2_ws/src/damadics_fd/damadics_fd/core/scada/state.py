@@ -73,6 +73,7 @@ class Reference(Record):
     pressure: Annotated[Rows[PressureFilter], 2]
     hold: bool  # CV is held between samples
     cv_jump: float  # change of CV between two samples that was not learned
+    air: float  # logarithm of the air with which the stated stem starts
     w: Annotated[Floats, N_WEIGHTS]
     dp_mean: float
     g0: float
@@ -176,6 +177,7 @@ class MonitorState(Record):
     rest: int
     lasting: float  # of r1 of a law, no evidence where it lasts
     llr: float
+    llr_before: float  # the same before the present slip
     llr_zero: float
     ratio: float  # largest statistic / limit
     worst: int

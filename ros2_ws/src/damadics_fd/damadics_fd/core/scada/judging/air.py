@@ -18,14 +18,17 @@ from damadics_fd.core.scada.model import advance_stem, copy_stem
 from damadics_fd.core.scada.settings import ScadaConfig
 from damadics_fd.core.scada.state import HISTORY_LENGTH, LAW, MonitorState, Reference
 
-LOOKS = (240, 640, 1440)  # samples of the first look and of the later, finer ones
+LOOKS = (240, 560, 1440)  # samples of the first look and of the later, finer ones
 SHORTEST = 60
 ARRIVED = 40  # samples after which a stem that began at rest is where it is sent
-AS_LEARNED = 1.15  # of the variance that was learned: nothing to be found
-EXPLAINED = 1.3  # the same afterwards: what is left is no other fault's
+EXPLAINED = 1.3  # of the variance that was learned: what is left is no other fault's
 STEP = 0.02  # of the logarithm of the air
 LEAST, MOST = -0.3, 0.3  # what a day of much motion makes of it
-NATS = 10.0  # by which the air that is found at first must be likelier
+# Standard errors of r1 for air that was found: per its logarithm, and until the last look at it.
+OTHER_AIR, UNSETTLED = 10.0, 2.0
+# By which air that is found must be likelier than none: at first it is on trial, and nothing has
+# been tested yet; what shows late may be a fault that grows.
+NATS = (4.0, 6.0, 20.0)
 
 
 @jit
@@ -53,9 +56,6 @@ def seek_air(s: MonitorState, cfg: ScadaConfig, ref: Reference) -> None:
     s.air_since = s.filled  # the next look is at samples of the model as it is from now on
     learned = ref.s1 * ref.s1
     without = left_with(s, cfg, n, 0.0)
-    if look == 0 and not without > AS_LEARNED * learned:
-        s.air_looks = len(LOOKS)
-        return
     step = STEP
     before = left_with(s, cfg, n, -step)
     least = without
@@ -68,17 +68,36 @@ def seek_air(s: MonitorState, cfg: ScadaConfig, ref: Reference) -> None:
         best += step
         before, least = least, after
         after = left_with(s, cfg, n, best + step)
-    bend = before + after - 2.0 * least
-    if bend > 0.0:
-        best += min(max(0.5 * step * (before - after) / bend, -STEP), STEP)
+    best += vertex(before, least, after, step)
     found = left_with(s, cfg, n, best)
-    gain = 0.5 * n / ref.kap2 * math.log(without / max(found, 0.5 * learned))
-    if found < EXPLAINED * learned and gain > (NATS if look == 0 else 0.0):
-        s.air += best
-        for i in range(2):
-            s.stem[i].m_a *= math.exp(best)
-    elif look == 0:
-        s.air_looks = len(LOOKS)
+    none = without if s.air == 0.0 else left_with(s, cfg, n, -s.air)
+    gain = 0.5 * n / ref.kap2 * math.log(none / max(found, 0.5 * learned))
+    likely = found < EXPLAINED * learned and gain > NATS[look]
+    if not likely or (look == 2 and s.air == 0.0 and best < 0.0):
+        best = -s.air  # running takes air: what shows late, the other way, is something else
+    s.air += best
+    for i in range(2):
+        s.stem[i].m_a *= math.exp(best)
+    s.air_doubt = 0.0
+    if s.air != 0.0:
+        s.air_doubt = OTHER_AIR * abs(s.air) + (UNSETTLED if s.air_looks < len(LOOKS) else 0.0)
+
+
+@jit
+def vertex(before: float, least: float, after: float, step: float) -> float:
+    """
+    Return how far from the middle one of three values their parabola is least, a step at most.
+
+    :param step: between two of them.
+
+    >>> round(vertex(1.5**2, 0.5**2, 0.5**2, 1.0), 6)
+    0.5
+    """
+    bend = before + after - 2.0 * least
+    if not bend > 0.0:
+        return math.copysign(step, before - after)
+    value: float = 0.5 * step * min(max((before - after) / bend, -2.0), 2.0)
+    return value
 
 
 @jit

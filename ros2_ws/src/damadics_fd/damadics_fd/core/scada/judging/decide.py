@@ -14,7 +14,8 @@ from damadics_fd.core.scada.judging.spikes import reject_spikes
 from damadics_fd.core.scada.laws.stem_law import shrink
 from damadics_fd.core.scada.state import LAW, N_RESIDUALS, N_TESTS, MonitorState, Reference
 
-LLR_CLIP = 8.0
+LLR_CLIP = 8.0  # nats that one sample brings at most, and one slip
+AGREED = 1.0  # sigma within which the models with and without friction are at one place
 MOTION = 0.003  # of the stroke: the stem has moved
 HELD = 10  # samples at rest after which its play may hold a stem beside its law
 SHOWN = 60  # samples after a motion that show its friction
@@ -40,6 +41,7 @@ def silence(s: MonitorState) -> None:
     s.zero[:] = s.t
     s.stretch[:] = 0.0
     s.llr = 0.0
+    s.llr_before = 0.0
     s.llr_zero = s.t
     s.ratios[:] = 0.0
     s.good[:] = 0
@@ -167,6 +169,24 @@ def allow_for_play(s: MonitorState, ref: Reference) -> None:
 
 
 @jit
+def weigh(llr: float, before: float, gain: float, wider: float) -> tuple[float, float]:
+    """
+    Add the evidence of a sample to a likelihood ratio for friction.
+
+    While the two models are apart, one and the same slip that came early or late shows sample for
+    sample: it counts as one, however long it lasts.
+
+    :param before: of the likelihood ratio, when the models agreed last.
+    :param gain: of this sample, nats.
+    :param wider: distance between the models, sigma.
+    :return: likelihood ratio with it; and before this slip.
+    """
+    if abs(wider) < AGREED:
+        before = llr
+    return min(llr + min(max(gain, -LLR_CLIP), LLR_CLIP), before + LLR_CLIP), before
+
+
+@jit
 def test_friction(s: MonitorState, ref: Reference) -> None:
     """Compare the model with a copy of three times the play by their likelihoods."""
     s.rest = rests(s.xm[0], s.anchor, s.rest)
@@ -180,7 +200,7 @@ def test_friction(s: MonitorState, ref: Reference) -> None:
         # away from where it was learned the bias of the model may favour the wider play
         unsure = ref.se[FIRST_OF_R1] * (s.lever[R1] - 1.0 + s.air_doubt)
         gain = (0.5 * (z1 * z1 - z1d * z1d) - abs(wider) * unsure) / ref.kap2
-        s.llr += min(max(gain, -LLR_CLIP), LLR_CLIP)
+        s.llr, s.llr_before = weigh(s.llr, s.llr_before, gain, wider)
         s.llr = min(s.llr, CAPS[0] * ref.llr_limit)
         if s.llr <= 0.0:
             s.llr = 0.0

@@ -86,7 +86,7 @@ def restart(
     s.f_lagged = math.nan
     s.f_slow = math.nan
     s.last[:] = math.nan
-    more = air_over_rest(s.stem[0], cfg.act) if s.filled > 0 else 1.0
+    more = air_over_rest(s.stem[0], cfg.act) if s.filled > 0 else math.exp(ref.air)
     start_stem(s.stem[0], cfg.act, t)
     s.stem[0].m_a *= more
     copy_stem(s.stem[0], s.stem[1])

@@ -9,7 +9,7 @@ import numpy as np
 
 from damadics_fd.core.jit import jit
 from damadics_fd.core.scada.judging.cusum import PROCESS, R1, R2, TESTS, siegmund_limit
-from damadics_fd.core.scada.judging.decide import LLR_CLIP, SHOWN, rests
+from damadics_fd.core.scada.judging.decide import SHOWN, rests, weigh
 from damadics_fd.core.scada.laws.robust import Floats, block_spread, spread_of
 from damadics_fd.core.scada.settings import ScadaSettings
 from damadics_fd.core.scada.state import LAW, Reference
@@ -50,11 +50,13 @@ def cusum_maximum(z: np.ndarray, k: float, clip: float) -> float:
 
 
 @jit
-def _llr_maximum(gain: np.ndarray) -> float:
+def _llr_maximum(gain: np.ndarray, wider: np.ndarray) -> float:
     g = 0.0
+    before = 0.0
     largest = 0.0
-    for value in gain:
-        g = max(0.0, g + min(max(value, -LLR_CLIP), LLR_CLIP))
+    for i in range(gain.size):
+        g, before = weigh(g, before, gain[i], wider[i])
+        g = max(g, 0.0)
         largest = max(largest, g)
     return largest
 
@@ -220,9 +222,11 @@ def friction_limit(
     r, wide_by = r1[ok], wider[ok]
     s1 = float(inliers(r).std())
     kap2 = max(1.0, (block_sigma(inliers(r), 5) / s1) ** 2)
-    wide = (r + wide_by) / s1
-    gain = ((r / s1) ** 2 - wide**2) / (2.0 * kap2)
+    apart = wide_by / s1
+    gain = ((r / s1) ** 2 - (r / s1 + apart) ** 2) / (2.0 * kap2)
     gain[~_moved(model)[ok]] = 0.0
     ref.s1, ref.kap2 = s1, kap2
     arl = arl_per_test(settings, max(settings.period_s, float(ref.period)))
-    ref.llr_limit = max(LLR_MARGINS[wandering] * math.log(arl), LLR_HEAD_ROOM * _llr_maximum(gain))
+    ref.llr_limit = max(
+        LLR_MARGINS[wandering] * math.log(arl), LLR_HEAD_ROOM * _llr_maximum(gain, apart)
+    )

@@ -24,7 +24,6 @@ DOUBT = 3.0  # standard deviations of a law that are no evidence
 X = 2  # place of the position among the signals
 NEAR = 0.01  # of the stroke, still where it was learned
 BENT = 0.02  # by which the gain of a stem may be another where it was not learned
-OTHER_AIR = 10.0  # standard errors of r1 for air that was found, per its logarithm
 STOP = 0.015  # this near to an end of the stroke the stem is at its stop
 STOP_DOUBT = 0.05  # of the stroke, at a stop and for a while after it has left
 STOP_S = 60.0
@@ -78,7 +77,6 @@ def residuals(
         s.lasting = DOUBT * STEM_LASTING * hours_unseen(ref)
         s.away[0] = 0.0
         s.lever[0] = 1.0
-        s.air_doubt = 0.0
     else:
         for i in range(N_WEIGHTS):
             correction += ref.w[i] * s.phi[i]
@@ -86,7 +84,6 @@ def residuals(
         doubt = 0.0
         s.away[0] = (xm - ref.x_mean) / ref.x_sd
         s.lever[0] = lever(s.away[0])
-        s.air_doubt = OTHER_AIR * abs(s.air)
     if min(xm, s.cv[0]) < STOP or max(xm, s.cv[0]) > 1.0 - STOP:
         s.t_stop = s.t + STOP_S
     if s.t < s.t_stop:
