@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from damadics_fd.core.signature import state as st
-from damadics_fd.core.signature.air import strokes_agree
+from damadics_fd.core.signature.air.strokes import strokes_agree
 from damadics_fd.core.signature.settings import SignatureSettings
 from damadics_fd.core.signature.signature import Signature
 from damadics_fd.core.signature.state import CAUSES

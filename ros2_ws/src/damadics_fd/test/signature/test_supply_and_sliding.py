@@ -4,7 +4,9 @@
 
 import numpy as np
 import pytest
-from damadics_fd.core.signature import air, sliding, supply
+from damadics_fd.core.signature import sliding
+from damadics_fd.core.signature.air import strokes as air
+from damadics_fd.core.signature.air import supply
 from damadics_fd.core.signature.settings import SignatureSettings
 from damadics_fd.core.signature.state import FILL, STROKES, VENT, State
 

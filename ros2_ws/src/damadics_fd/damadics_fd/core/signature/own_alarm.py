@@ -5,7 +5,8 @@
 import math
 
 from damadics_fd.core.jit import jit
-from damadics_fd.core.signature.air import restart_air
+from damadics_fd.core.signature.air.strokes import restart_air
+from damadics_fd.core.signature.air.supply import supply_change, supply_lost
 from damadics_fd.core.signature.cause import (
     FULL_EVIDENCE,
     STAGE2_EVIDENCE,
@@ -38,7 +39,6 @@ from damadics_fd.core.signature.state import (
     OwnAlarm,
     State,
 )
-from damadics_fd.core.signature.supply import supply_change, supply_lost
 
 HYSTERESIS = 0.9  # of a material change
 

@@ -15,7 +15,7 @@ import math
 from damadics_fd.core.jit import jit
 from damadics_fd.core.linalg import inverse
 from damadics_fd.core.record import Floats
-from damadics_fd.core.signature.air import forget_air
+from damadics_fd.core.signature.air.strokes import forget_air
 from damadics_fd.core.signature.cues import forget_stick
 from damadics_fd.core.signature.evidence import clear_set
 from damadics_fd.core.signature.phase import enter

@@ -5,7 +5,8 @@
 import math
 
 from damadics_fd.core.jit import jit, layer
-from damadics_fd.core.signature.air import strokes_agree, track_air
+from damadics_fd.core.signature.air.strokes import strokes_agree, track_air
+from damadics_fd.core.signature.air.supply import supply_lost
 from damadics_fd.core.signature.blocks import (
     add_sample,
     break_run,
@@ -56,7 +57,6 @@ from damadics_fd.core.signature.state import (
     State,
 )
 from damadics_fd.core.signature.sums import accumulate, copy_sums, growth_time, residual
-from damadics_fd.core.signature.supply import supply_lost
 
 BREAK_AWAY = 2  # blocks of a stroke in which strong friction is still more than when sliding
 QUIET, BLOCK, CHANGED = 0, 1, 2  # what a step returns: nothing new, a block, a new judgement

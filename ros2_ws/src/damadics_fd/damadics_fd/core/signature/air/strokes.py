@@ -13,9 +13,9 @@ import math
 
 from damadics_fd.core.jit import jit
 from damadics_fd.core.record import Floats
+from damadics_fd.core.signature.air.supply import P_ATM, elsewhere, law_of, note_law, note_level
 from damadics_fd.core.signature.settings import SignatureSettings
 from damadics_fd.core.signature.state import FILL, PS, RATE, STROKES, VENT, WHEN, Air, State
-from damadics_fd.core.signature.supply import P_ATM, elsewhere, law_of, note_law, note_level
 
 ALIKE = 0.9  # [1] strokes at full opening differ by 4 % at most, those of ramps by 10 to 40 %
 ELSEWHERE, ANYWHERE = 0.4, 1.0  # of one stroke of the spring: law of the flow not known, known
