@@ -240,7 +240,7 @@ def test_settings_read_the_same_uncompiled():
 def test_every_field_of_the_state_is_written_by_one_file():
     room = Path(inspect.getfile(State)).parent
     writers = {name: set() for name in State.names()}
-    for source in room.glob('*.py'):
+    for source in room.rglob('*.py'):
         for function in ast.walk(ast.parse(source.read_text('utf-8'))):
             if isinstance(function, ast.FunctionDef):
                 for name in written(function) & writers.keys():

@@ -13,7 +13,14 @@ import math
 
 from damadics_fd.core.jit import jit
 from damadics_fd.core.record import Floats
-from damadics_fd.core.signature.air.supply import P_ATM, elsewhere, law_of, note_law, note_level
+from damadics_fd.core.signature.air.supply import (
+    P_ATM,
+    elsewhere,
+    forget_law,
+    law_of,
+    note_law,
+    note_level,
+)
 from damadics_fd.core.signature.settings import SignatureSettings
 from damadics_fd.core.signature.state import FILL, PS, RATE, STROKES, VENT, WHEN, Air, State
 
@@ -245,7 +252,5 @@ def forget_air(s: Air) -> None:
         s.air_learned[way] = 0
         s.air_ref[way] = 0.0
         s.air_ref_ps[way] = 0.0
-        s.air_last_t[way] = 0
-        s.air_law[way, :] = 0.0
-    s.air_above = 0.0
+    forget_law(s)
     restart_air(s)

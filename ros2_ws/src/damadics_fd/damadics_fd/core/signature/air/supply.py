@@ -21,11 +21,8 @@ SONIC, HALF = 0.85, 0.5  # where the law is not known: weight of ISO 6358, and i
 APART = 120 * 1_000_000_000  # [ns] strokes further apart may have another supply
 NEAR = 0.07  # [1] by which the laws differ: else a loss of supply could pass for one of them
 STRAY = 0.02  # [1] beyond what either law explains: no full opening, or another supply
-PAIRS, LEAST_PAIRS, FULL_PAIRS = (
-    0,
-    6,
-    60.0,
-)  # where they are counted; from when they tell, and are enough
+PAIRS = 0  # where pairs of strokes are counted
+LEAST_PAIRS, FULL_PAIRS = 6, 60.0  # from when they tell the law, and are enough
 LAW_STD = 0.15  # standard deviation of the share from which the law is known
 SLOW = 1.7  # of a loss at once: a slow one, as by a supply that swings, is larger
 AS_BEFORE = 0.05  # change of the top venting rate that is none
@@ -53,6 +50,19 @@ def note_law(s: Air, c: SignatureSettings, way: int, t: int) -> None:
     s.air_last_t[way] = t
     s.air_last[way, 0] = g
     s.air_last[way, 1] = y
+
+
+@jit
+def forget_law(s: Air) -> None:
+    """
+    Learn the law of the flow anew, and forget where the supply was.
+
+    :param s: state record.
+    """
+    for way in range(2):
+        s.air_last_t[way] = 0
+        s.air_law[way, :] = 0.0
+    s.air_above = 0.0
 
 
 @jit
