@@ -29,7 +29,7 @@ from damadics_fd.core.scada.laws.clean import (
 )
 from damadics_fd.core.scada.laws.fit_stem import Piece, StemFit, fit_stem
 from damadics_fd.core.scada.laws.plausible import LearningError, check_stem, possible
-from damadics_fd.core.scada.laws.robust import Floats, huber_weights, loss_of
+from damadics_fd.core.scada.laws.robust import Floats, effective, huber_weights, loss_of
 from damadics_fd.core.scada.prediction import Prediction, predicted, residuals_of
 from damadics_fd.core.scada.samples import CV, PRESSURE_1, PRESSURE_2, T, X
 from damadics_fd.core.scada.settings import ScadaSettings
@@ -49,9 +49,12 @@ STATED = 0.8  # share to which the stated actuator must cut the variance of an i
 # ... or equal it and leave no more than the sensors' noise
 NEARLY, SENSOR = 1.1, 1.5
 LEAST_SAMPLES = 200
+NOTHING = 1e-14  # of the stroke, squared: a model without error
 MOST_STEPS = 8  # with which the air is looked for
+USUAL_AIR = 0.02  # deviation of its logarithm before anything is seen: a plant of two hours
 PUSHED = 0.02  # gain of the bias beyond which the actuator is another one
-QUIET, SHIFTED = 0.02, 0.005  # of the stroke: a stem that hardly moves shows no gain, but a shift
+# of the stroke: a stem that hardly moves shows neither gain nor air, but a shift
+QUIET, SHIFTED = 0.02, 0.005
 OFF = 1e9  # a limit that is never reached
 NEVER = 9.0  # a change of CV, which is 0..1, is never as large
 JUMPS = (0.05, 3.0)  # a jump of CV is more than this, and than this times the largest learned
@@ -201,6 +204,8 @@ def _choose_stem(
         ref.w[:] = 0.0
         ref.cv_jump = NEVER
         return prediction
+    if float(ref.x_sd) < QUIET:
+        return prediction
     return _fit_air(ref, reference, clean, x, settings, window, prediction, used)
 
 
@@ -215,21 +220,27 @@ def _fit_air(
     used: int,
 ) -> Prediction:
     """
-    Fit the air with which the stated stem starts: that which leaves least of r1.
+    Fit the air with which the stated stem starts: the likeliest by what it leaves of r1.
 
     A plant may have been running for long, and noise of the pressures makes a stem with more air
-    the smoother, better one: what is looked for after a start is what differs from this.
+    the smoother, better one: what is looked for after a start is what differs from this. Slow
+    loads do not tell the air, and what they seem to tell does not hold for others.
     """
+    told = effective(_bias(prediction.phi, x - prediction.xm, used)[1])
+
+    def cost(p: Prediction, air: float) -> float:
+        left = max(loss_of(_bias(p.phi, x - p.xm, used)[1]), NOTHING)
+        return 0.5 * told * math.log(left) + 0.5 * (air / USUAL_AIR) ** 2
 
     def at(air: float) -> tuple[float, Prediction]:
         ref.air = air
         p = predicted(clean, settings, reference, window, bool(ref.hold))
-        return loss_of(_bias(p.phi, x - p.xm, used)[1]), p
+        return cost(p, air), p
 
-    least, air = loss_of(_bias(prediction.phi, x - prediction.xm, used)[1]), 0.0
+    least, air = cost(prediction, 0.0), 0.0
     for _ in range(MOST_STEPS):
         before, after = at(air - STEP)[0], at(air + STEP)[0]
-        further = vertex(before, least, after, STEP)
+        further = max(vertex(before, least, after, STEP), -air)  # running takes air, never less
         air += further
         least, prediction = at(air)
         if abs(further) < STEP:
