@@ -19,6 +19,7 @@ from damadics_bringup.processes import Processes, free_domain, surroundings
 from damadics_fd.ros import qos
 from damadics_msgs.msg import Measurement
 from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.client import Client
 from rclpy.context import Context
 from rclpy.experimental import EventsExecutor
 from rclpy.qos import QoSProfile
@@ -48,6 +49,7 @@ class Peer:
         if publishes:
             self.publisher = self.node.create_publisher(Measurement, 'measurement', qos.SAMPLES)
         self.got: dict[str, list] = {}
+        self.clients: dict[str, Client] = {}
 
     def listen(self, kind, topic: str, profile: QoSProfile) -> list:
         messages = self.got[topic] = []
@@ -81,10 +83,20 @@ class Peer:
         self.node.destroy_subscription(heard)
 
     def call(self, kind, name: str, wait=None, **request):
-        """Call a service and return its answer; `wait`, as of the peer, lets samples go on."""
+        """
+        Call a service and return its answer; `wait`, as of the peer, lets samples go on.
+
+        That the client has found the server does not say that the server has found the client,
+        whose answer is lost before: it is given a moment, once.
+        """
         wait = wait or self.wait
-        client = self.node.create_client(kind, name)
+        known = name in self.clients
+        if not known:
+            self.clients[name] = self.node.create_client(kind, name)
+        client = self.clients[name]
         assert wait(client.service_is_ready), f'{name} is not served'
+        if not known:
+            wait(lambda: False, patience=promised(0.2))
         future = client.call_async(kind.Request(**request))
         assert wait(future.done), f'{name} does not answer'
         return future.result()
