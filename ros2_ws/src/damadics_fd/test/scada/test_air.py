@@ -57,6 +57,12 @@ def test_slow_motion_tells_little_air_and_never_less_than_none(seed):
     assert 0.0 <= slow['air'][0] < 0.03
 
 
+def test_there_is_never_less_air_than_none(reference):
+    monitor = ScadaMonitor(LATE, reference)
+    monitor.run_samples(driven(900, seed=21, air=0.9))
+    assert float(reference['air'][0]) + float(monitor.state.air) >= 0.0
+
+
 def test_what_was_found_is_kept_over_a_gap(reference):
     rows = driven(900, seed=22, air=1.25)
     monitor = ScadaMonitor(LATE, reference)

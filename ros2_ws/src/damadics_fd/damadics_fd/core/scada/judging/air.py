@@ -69,12 +69,13 @@ def seek_air(s: MonitorState, cfg: ScadaConfig, ref: Reference) -> None:
         before, least = least, after
         after = left_with(s, cfg, n, best + step)
     best += vertex(before, least, after, step)
+    best = max(best, -ref.air - s.air)  # running takes air: never less than none
     found = left_with(s, cfg, n, best)
     none = without if s.air == 0.0 else left_with(s, cfg, n, -s.air)
     gain = 0.5 * n / ref.kap2 * math.log(none / max(found, 0.5 * learned))
     likely = found < EXPLAINED * learned and gain > NATS[look]
     if not likely or (look == 2 and s.air == 0.0 and best < 0.0):
-        best = -s.air  # running takes air: what shows late, the other way, is something else
+        best = -s.air  # what shows late, the other way, is something else
     s.air += best
     for i in range(2):
         s.stem[i].m_a *= math.exp(best)
