@@ -41,6 +41,9 @@ from damadics_fd.core.valve.plug import recovery
 SLOPE = 0.015  # [1] the slope of the plug force is taken over +- this part of the stroke
 MPA = 1e6
 STEADY = 1.0 / 3.0  # of the larger of the steps into and out of a block: less, and it stood
+# Dry friction over the noise of a block: what a lag still carries of the stem at rest is unknown
+# by this much.
+START_DOUBT = 15.0
 
 
 @jit
@@ -269,8 +272,9 @@ def judge_block(s: State, c: SignatureSettings) -> None:
         slow = math.exp(-((v / c.v_stribeck) ** 2))
         sticky = sticks(s, c, v)
         doubtful = STICKY_DOUBT if sticky else 0.0
-        s.block.w = 1.0 / (1.0 + max(c.stribeck_weight * slow, doubtful))
-        s.block.age = s.block.w if sticky else 1.0
+        begun = (START_DOUBT * c.carried**s.slide) ** 2
+        s.block.w = 1.0 / (1.0 + max(c.stribeck_weight * slow, doubtful, begun))
+        s.block.age = s.block.w if sticky or begun > 1.0 else 1.0
         regressor(s, c, slow, sticky)
         return
     s.slide = 0
