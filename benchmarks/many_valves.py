@@ -22,6 +22,7 @@ import yaml
 from damadics_bringup.processes import executable
 from damadics_fd.core.bank.bank import Bank
 from damadics_fd.core.monitor import monitor_for
+from damadics_fd.core.record import Saved
 from damadics_fd.core.sample import SIGNALS
 from damadics_fd.core.settings import Settings
 from damadics_fd.ros import qos
@@ -37,6 +38,7 @@ ROWS = 1000  # of a block
 TAKEN = ('judged', 'refused by their monitors')
 IDLE = 10.0  # s
 PATIENCE = 180.0  # s
+SLOW = {'t_on': 60.0, 't_w': 60.0, 't_learn': 400.0}  # mode scada
 REPEATS = 8  # of the compiled loops, in turns
 
 
@@ -140,17 +142,38 @@ def loops(column: ColumnLoop, valves: int = 10_000) -> dict[str, float]:
     }
 
 
+def learned_room(settings: Settings) -> Saved:
+    """Return the reference of a valve in mode scada."""
+    chain = monitor_for(settings)
+    chain.run(simulate('f16_B', rate=1.0, duration=800.0, noise=True).columns)
+    return chain.learned()
+
+
+def burst(valves: int = 100, instants: int = 700) -> float:
+    """Return the CPU time of the dearest instant after a common start, in usual ones."""
+    settings = Settings.for_mode('scada', sample_rate=1.0, **SLOW)
+    bank = Bank([settings] * valves)
+    learned = learned_room(settings)
+    for place in range(valves):
+        bank.restore(place, learned)
+    columns = simulate('f16_B', rate=1.0, duration=800.0, noise=True, seed=7).columns
+    numbers, spent = np.arange(valves), []
+    for n in range(instants):
+        stamp = np.full(valves, columns['stamp'][n])
+        signals = {name: np.full(valves, columns[name][n]) for name in SIGNALS}
+        began = time.process_time()
+        bank.take(numbers, stamp, signals)
+        spent.append(time.process_time() - began)
+    return max(spent[1:]) / statistics.median(spent)
+
+
 def write_list(folder: Path, valves: int, mode: str) -> Path:
     """Write a list of valves; in mode scada each with a reference, learned of one of them."""
-    slow = {'t_on': 60.0, 't_w': 60.0, 't_learn': 400.0} if mode == 'scada' else {}
+    slow = SLOW if mode == 'scada' else {}
     rate = 1.0 if mode == 'scada' else 200.0
     settings = Settings.for_mode(mode, sample_rate=rate, **slow)
     entries = {}
-    learned = {}
-    if mode == 'scada':
-        chain = monitor_for(settings)
-        chain.run(simulate('f16_B', rate=1.0, duration=800.0, noise=True).columns)
-        learned = chain.learned()
+    learned = learned_room(settings) if mode == 'scada' else {}
     for n in range(valves):
         given = {'mode': mode, 'sample_rate': rate, **slow}
         if learned:
@@ -263,6 +286,7 @@ def figures(folder: Path, before: Path | None = None) -> dict[str, float]:
         'start_1000_cpu_s': many['start_cpu_s'],
         'rss_mb_per_valve': (many['memory_mb'] - few['memory_mb']) / 990.0,
         'lost': many['lost'] + few['lost'] + scada['lost'],
+        'scada_burst': burst(),
         **found,
         'blocks_us': many['us'],
         'scada_us': scada['us'],

@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 
-from damadics_fd.core.scada.judging.air import STEP, vertex
 from damadics_fd.core.scada.judging.cusum import R1
 from damadics_fd.core.scada.judging.gap import GAP_PERIODS
 from damadics_fd.core.scada.judging.limits import (
@@ -50,7 +49,7 @@ STATED = 0.8  # share to which the stated actuator must cut the variance of an i
 NEARLY, SENSOR = 1.1, 1.5
 LEAST_SAMPLES = 200
 NOTHING = 1e-14  # of the stroke, squared: a model without error
-MOST_STEPS = 8  # with which the air is looked for
+STEP, MOST_STEPS = 0.02, 8  # of its logarithm, with which the air is looked for
 USUAL_AIR = 0.02  # deviation of its logarithm before anything is seen: a plant of two hours
 PUSHED = 0.02  # gain of the bias beyond which the actuator is another one
 # of the stroke: a stem that hardly moves shows neither gain nor air, but a shift
@@ -240,7 +239,7 @@ def _fit_air(
     least, air = cost(prediction, 0.0), 0.0
     for _ in range(MOST_STEPS):
         before, after = at(air - STEP)[0], at(air + STEP)[0]
-        further = max(vertex(before, least, after, STEP), -air)  # running takes air, never less
+        further = max(_vertex(before, least, after, STEP), -air)  # running takes air, never less
         air += further
         least, prediction = at(air)
         if abs(further) < STEP:
@@ -248,6 +247,21 @@ def _fit_air(
     ref.w[:used], _ = _bias(prediction.phi, x - prediction.xm, used)
     ref.x_mean, ref.x_sd = prediction.xm.mean(), max(prediction.xm.std(), 1e-3)
     return prediction
+
+
+def _vertex(before: float, least: float, after: float, step: float) -> float:
+    """
+    Return how far from the middle one of three values their parabola is least, a step at most.
+
+    :param step: between two of them.
+
+    >>> round(_vertex(1.5**2, 0.5**2, 0.5**2, 1.0), 6)
+    0.5
+    """
+    bend = before + after - 2.0 * least
+    if not bend > 0.0:
+        return math.copysign(step, before - after)
+    return 0.5 * step * min(max((before - after) / bend, -2.0), 2.0)
 
 
 def _bias(phi: Floats, error: Floats, used: int) -> tuple[Floats, Floats]:

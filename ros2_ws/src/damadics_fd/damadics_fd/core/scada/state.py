@@ -17,6 +17,7 @@ BASIC_WEIGHTS = 3  # constant, gain, CV slope; the others only where they earn t
 HISTORY_LENGTH = 1536
 N_RESIDUALS = 6
 N_ROUGH = 5  # of them, whose noise is followed: all but the process
+FIRST_TRIAL, TRIALS = 2, 6  # models that run beside the two after a start
 NOMINAL, LAW = range(2)  # where stem and flow come from: the stated actuator, what was identified
 
 
@@ -112,12 +113,12 @@ class MonitorState(Record):
     steady: int  # samples in a row at the period
     strange: int  # samples in a row at another period than the learned one
     innovation: Annotated[Floats, 2]  # of P1, P2; NaN until as many as taps are steady
-    stem: Annotated[Rows[StemState], 3]  # nominal, wide play, a trial
-    air: (
-        float  # logarithm of the air that was found in the models at the start, see judging/air.py
-    )
+    stem: Annotated[Rows[StemState], FIRST_TRIAL + TRIALS]  # nominal, wide play, others' air
+    air: float  # logarithm of the air that was found at the start, see judging/air.py
     air_looks: int  # that were taken at it
-    air_since: int  # samples before the last one
+    air_count: int  # samples since the last one
+    air_fit: Annotated[Floats, TRIALS + 1, 3]  # sums over them, see judging/air.py
+    air_x: Annotated[Floats, TRIALS]  # scratch
     track: StemTrack
     xs: float  # slow copy of the stem law
     xq: float  # quick copy

@@ -11,24 +11,35 @@ had.
 
 import math
 
+import numpy as np
+
 from damadics_fd.core.jit import jit
 from damadics_fd.core.scada.judging.cusum import R1
 from damadics_fd.core.scada.judging.residuals import speaks
-from damadics_fd.core.scada.model import advance_stem, copy_stem
+from damadics_fd.core.scada.model import advance_two, copy_stem
 from damadics_fd.core.scada.settings import ScadaConfig
-from damadics_fd.core.scada.state import HISTORY_LENGTH, LAW, MonitorState, Reference
+from damadics_fd.core.scada.state import (
+    FIRST_TRIAL,
+    HISTORY_LENGTH,
+    LAW,
+    MonitorState,
+    Reference,
+)
 
-LOOKS = (240, 560, 1440)  # samples of the first look and of the later, finer ones
-SHORTEST = 60
+LOOKS = (60, 560, 1440)  # samples of the first look, at least, and of the later, finer ones
 ARRIVED = 40  # samples after which a stem that began at rest is where it is sent
 EXPLAINED = 1.3  # of the variance that was learned: what is left is no other fault's
-STEP = 0.02  # of the logarithm of the air
-LEAST, MOST = -0.3, 0.3  # what a day of much motion makes of it
+# More air of the models that are compared, as a logarithm, by look; 0 is the one that is followed.
+OFFSETS = np.array(
+    [[-0.06, 0.0, 0.05, 0.1, 0.16, 0.23, 0.31]] + 2 * [[-0.05, 0.0, 0.05] + 4 * [math.nan]]
+)
+MODELS = (7, 3, 3)  # of them, at most one more than TRIALS
 # Standard errors of r1 for air that was found: per its logarithm, and until the last look at it.
 OTHER_AIR, UNSETTLED = 10.0, 2.0
 # By which air that is found must be likelier than none: at first it is on trial, and nothing has
 # been tested yet; what shows late may be a fault that grows.
 NATS = (4.0, 6.0, 20.0)
+E, EE, NEXT = range(3)  # sums over r1 of a model: itself, its square, times that of the next model
 
 
 @jit
@@ -36,42 +47,31 @@ def seek_air(s: MonitorState, cfg: ScadaConfig, ref: Reference) -> None:
     """
     Before the first test after a start, take the air with which the models follow the stem.
 
-    What was found is looked at again when there are more samples.
+    What was found is looked at again when there are more samples. Copies of the model with other
+    air run beside it meanwhile: so many valves that start together have no common moment of much
+    work.
 
     :param s: record of `MonitorState`, after a sample.
     :param cfg: record of `SETTINGS`.
     :param ref: record of `REFERENCE`.
     """
-    look = s.air_looks
-    n = min(s.filled - s.air_since, LOOKS[look])
+    if ref.stem_kind == LAW:
+        return
+    if s.filled <= ARRIVED or s.stood:
+        begin_trials(s, s.air_looks)
+        return
+    follow_trials(s, cfg, s.air_looks)
+    look, n = s.air_looks, s.air_count
     if look > 0:
-        ready = n == LOOKS[look] and not speaks(s, ref, R1)
+        ready = not speaks(s, ref, R1)
     else:
-        n = min(s.filled - ARRIVED, LOOKS[0])
-        first_test = max(s.t_test, s.t_stem)
-        ready = n >= SHORTEST and s.t + 1.5 * max(cfg.period_s, ref.period) >= first_test
-    if ref.stem_kind == LAW or s.stood or not ready:
+        ready = s.t + 1.5 * max(cfg.period_s, ref.period) >= max(s.t_test, s.t_stem)
+    if not ready or n < LOOKS[look]:
         return
     s.air_looks += 1
-    s.air_since = s.filled  # the next look is at samples of the model as it is from now on
     learned = ref.s1 * ref.s1
-    without = left_with(s, cfg, n, 0.0)
-    step = STEP
-    before = left_with(s, cfg, n, -step)
-    least = without
-    after = left_with(s, cfg, n, step)
-    best = 0.0
-    if before < after:
-        step = -step
-        before, after = after, before
-    while after < least and LEAST <= best + step <= MOST:
-        best += step
-        before, least = least, after
-        after = left_with(s, cfg, n, best + step)
-    best += vertex(before, least, after, step)
-    best = max(best, -ref.air - s.air)  # running takes air: never less than none
-    found = left_with(s, cfg, n, best)
-    none = without if s.air == 0.0 else left_with(s, cfg, n, -s.air)
+    best = max(likeliest(s, look), -ref.air - s.air)  # running takes air: never less than none
+    found, none = left_with(s, look, best), left_with(s, look, -s.air)
     gain = 0.5 * n / ref.kap2 * math.log(none / max(found, 0.5 * learned))
     likely = found < EXPLAINED * learned and gain > NATS[look]
     if not likely or (look == 2 and s.air == 0.0 and best < 0.0):
@@ -82,54 +82,115 @@ def seek_air(s: MonitorState, cfg: ScadaConfig, ref: Reference) -> None:
     s.air_doubt = 0.0
     if s.air != 0.0:
         s.air_doubt = OTHER_AIR * abs(s.air) + (UNSETTLED if s.air_looks < len(LOOKS) else 0.0)
+    if s.air_looks < len(LOOKS):
+        begin_trials(s, s.air_looks)
 
 
 @jit
-def vertex(before: float, least: float, after: float, step: float) -> float:
-    """
-    Return how far from the middle one of three values their parabola is least, a step at most.
-
-    :param step: between two of them.
-
-    >>> round(vertex(1.5**2, 0.5**2, 0.5**2, 1.0), 6)
-    0.5
-    """
-    bend = before + after - 2.0 * least
-    if not bend > 0.0:
-        return math.copysign(step, before - after)
-    value: float = 0.5 * step * min(max((before - after) / bend, -2.0), 2.0)
-    return value
+def begin_trials(s: MonitorState, look: int) -> None:
+    """Let copies of the model go on from here with other air."""
+    trial = FIRST_TRIAL
+    for k in range(MODELS[look]):
+        if OFFSETS[look, k] != 0.0:
+            copy_stem(s.stem[0], s.stem[trial])
+            s.stem[trial].m_a *= math.exp(OFFSETS[look, k])
+            trial += 1
+    s.air_count = 0
+    s.air_fit[:] = 0.0
 
 
 @jit
-def left_with(s: MonitorState, cfg: ScadaConfig, n: int, more: float) -> float:
+def follow_trials(s: MonitorState, cfg: ScadaConfig, look: int) -> None:
+    """Advance the copies by a sample, and sum up what r1 would be with each."""
+    a = s.history[(s.samples - 1) % HISTORY_LENGTH]
+    x = s.air_x
+    for k in range(0, MODELS[look] - 1, 2):
+        x[k], x[k + 1] = advance_two(
+            s.stem[FIRST_TRIAL + k],
+            s.stem[FIRST_TRIAL + k + 1],
+            cfg.act,
+            s.fault[0],
+            s.fault[0],
+            a.t0,
+            a.t,
+            a.cv0,
+            a.cv,
+            a.dp0,
+            a.dp,
+            a.slope0,
+            a.slope,
+        )
+    if math.isnan(a.r1):
+        return
+    s.air_count += 1
+    trial = 0
+    before = 0.0
+    for k in range(MODELS[look]):
+        e = a.r1
+        if OFFSETS[look, k] != 0.0:
+            e += a.xm - x[trial]
+            trial += 1
+        s.air_fit[k, E] += e
+        s.air_fit[k, EE] += e * e
+        if k > 0:
+            s.air_fit[k - 1, NEXT] += before * e
+        before = e
+
+
+@jit
+def spread_between(s: MonitorState, k: int) -> tuple[float, float, float]:
     """
-    Return the variance of r1 over the last n samples, had the model held more air.
+    Return variances and covariance of r1 of model k and the next one.
 
     The mean does not count: a stem that is off is no slower for it.
-
-    :param more: logarithm of the share of air.
     """
-    first = s.samples - n
-    trial = s.stem[2]
-    copy_stem(s.history[first % HISTORY_LENGTH].stem, trial)
-    trial.m_a *= math.exp(more)
-    total = 0.0
-    squares = 0.0
-    counted = 0
-    for i in range(first, s.samples):
-        e = s.history[i % HISTORY_LENGTH]
-        x = advance_stem(
-            trial, cfg.act, s.fault[0], e.t0, e.t, e.cv0, e.cv, e.dp0, e.dp, e.slope0, e.slope
-        )
-        error = e.x - x - e.correction
-        if math.isnan(error):
-            continue
-        counted += 1
-        total += error
-        squares += error * error
-    if counted < n // 2:
-        return math.nan
-    mean = total / counted
-    value: float = squares / counted - mean * mean
-    return value
+    n = s.air_count
+    one, other = s.air_fit[k], s.air_fit[k + 1]
+    mean, mean_o = one[E] / n, other[E] / n
+    return (
+        one[EE] / n - mean * mean,
+        other[EE] / n - mean_o * mean_o,
+        one[NEXT] / n - mean * mean_o,
+    )
+
+
+@jit
+def between(one: float, other: float, both: float, share: float) -> float:
+    """
+    Return the variance of r1 of a model that is moved by a share of the way to the next one.
+
+    >>> between(4.0, 1.0, 2.0, 0.0), between(4.0, 1.0, 2.0, 1.0), between(4.0, 1.0, -2.0, 0.5)
+    (4.0, 1.0, 0.25)
+    """
+    rest = 1.0 - share
+    return max(rest * rest * one + share * share * other + 2.0 * rest * share * both, 0.0)
+
+
+@jit
+def likeliest(s: MonitorState, look: int) -> float:
+    """Return the more air that leaves least of r1, by straight lines between the models."""
+    best, least = 0.0, math.inf
+    for k in range(MODELS[look] - 1):
+        one, other, both = spread_between(s, k)
+        apart = one + other - 2.0 * both
+        share = min(max((one - both) / apart, 0.0), 1.0) if apart > 0.0 else 0.0
+        left = between(one, other, both, share)
+        if left < least:
+            least = left
+            best = OFFSETS[look, k] + share * (OFFSETS[look, k + 1] - OFFSETS[look, k])
+    return best
+
+
+@jit
+def left_with(s: MonitorState, look: int, more: float) -> float:
+    """
+    Return the variance of r1, had the model held more air.
+
+    :param more: logarithm of the share of air; beyond the models the last line goes on.
+    """
+    k = 0
+    while k < MODELS[look] - 2 and more > OFFSETS[look, k + 1]:
+        k += 1
+    one, other, both = spread_between(s, k)
+    share = (more - OFFSETS[look, k]) / (OFFSETS[look, k + 1] - OFFSETS[look, k])
+    return between(one, other, both, share)
