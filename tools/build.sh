@@ -25,9 +25,10 @@ mkdir -p ros2_ws/log
 log=ros2_ws/log/build.txt
 # Else no job would begin while the machine has anything else to do.
 export MAKEFLAGS=${MAKEFLAGS:--j$(nproc)}
+# Generated sources share most of what they include: compiled together they take half the time.
 echo 'Building the workspace ...'
 if ! (cd ros2_ws && "$python" -m colcon --log-base log build --event-handlers console_cohesion+ \
-  --cmake-args -GNinja -DBUILD_TESTING=OFF "-DPython3_EXECUTABLE=$python" \
+  --cmake-args -GNinja -DBUILD_TESTING=OFF -DCMAKE_UNITY_BUILD=ON "-DPython3_EXECUTABLE=$python" \
   "-DPYTHON_EXECUTABLE=$python") >"$log" 2>&1; then
   tail -n 60 "$log" >&2
   echo "The build failed; the whole output is in $log." >&2
