@@ -46,6 +46,7 @@ from rich.table import Table
 
 sys.path.insert(0, str(Path(__file__).parents[1] / 'tests'))
 import website
+from conftest import free_port
 
 TICKS = os.sysconf('SC_CLK_TCK')
 WARM_UP = 5.0  # s after the first sample before CPU time is measured
@@ -132,7 +133,7 @@ def measure(options: argparse.Namespace, folder: Path) -> None:
         )
         for n in range(1, options.valves + 1)
     ]
-    port = website.free_port()
+    port = free_port()
     tasks = tasks_of(
         valves,
         argparse.Namespace(

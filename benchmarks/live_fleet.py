@@ -147,6 +147,7 @@ def run(options: argparse.Namespace, files: Path, folder: Path) -> dict[str, obj
     files.mkdir(exist_ok=True)
     sys.path.insert(0, str(Path(__file__).parents[1] / 'tests'))
     import website
+    from conftest import free_port
     from damadics_bringup.processes import Processes, free_domain, surroundings
     from damadics_fd.bag.opening import open_file
     from many_valves import cpu, resident
@@ -155,7 +156,7 @@ def run(options: argparse.Namespace, files: Path, folder: Path) -> dict[str, obj
     for kind in KINDS:
         if not (files / f'{kind.name}.yaml').exists():
             make(kind, counts[kind.name], options.seconds, files)
-    domain, port = free_domain(), website.free_port()
+    domain, port = free_domain(), free_port()
     environment = {**surroundings(domain), 'XDG_STATE_HOME': str(folder / 'state')}
     os.environ.update(environment)
     bag = folder / 'bag'
