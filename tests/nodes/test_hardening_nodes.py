@@ -32,7 +32,7 @@ NAMES = ('estimator', 'detector')
 def await_state(valve, state, patience=PATIENCE):
     assert valve.run_until(
         lambda: valve.flags and valve.flags[-1].state == state, patience=patience
-    )
+    ), (valve.flags[-1:], [valve.told(node)[-1:] for node in NAMES])
 
 
 def test_a_damaged_alarm_is_shown_as_lost_until_somebody_confirms(processes, peer, tmp_path):
