@@ -1,11 +1,15 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Single wrong samples of CV, which move the model and not the stem."""
+"""Single wrong samples: of CV they move the model and not the stem, of others one residual."""
+
+import math
 
 import numpy as np
 import pytest
+from damadics_fd.core.scada.judging.residuals import process_residual
 from damadics_fd.core.scada.learning import learn
 from damadics_fd.core.scada.monitor import ScadaMonitor
+from damadics_fd.core.scada.state import MONITOR
 
 from .driven import SETTINGS, driven
 
@@ -31,8 +35,43 @@ def test_a_wrong_sample_of_cv_raises_nothing(reference, off):
     assert not trace['alarm'].any()
 
 
+@pytest.mark.parametrize('off', [-0.2, 0.2])
+def test_two_wrong_samples_of_cv_raise_nothing(reference, off):
+    rows = driven(400, seed=5, **STEPS)
+    for first in range(85, 400, 60):
+        rows[first : first + 2, CV] = np.clip(rows[first : first + 2, CV] + off, 0.0, 1.0)
+    trace = ScadaMonitor(SETTINGS, reference).run_samples(rows)
+    assert not trace['alarm'].any()
+
+
 def test_a_fault_between_wrong_samples_is_found(reference):
     rows = driven(300, 6, 155, f13=0.25, **STEPS)
     rows[WRONG, CV] += 0.2
     trace = ScadaMonitor(SETTINGS, reference).run_samples(rows)
     assert 155.0 <= trace['t'][trace['alarm']][0] < 175.0
+
+
+@pytest.mark.parametrize(('signal', 'every'), [(2, 30), (2, 7), (6, 30)], ids=['X', 'many X', 'F'])
+@pytest.mark.parametrize('off', [0.05, 0.2])
+def test_a_wrong_sample_raises_nothing_however_far_a_statistic_has_come(
+    reference, signal, every, off
+):
+    rows = driven(600, seed=5, **STEPS)
+    rows[61::every, signal] = np.clip(rows[61::every, signal] + off, 0.0, 1.0)
+    trace = ScadaMonitor(SETTINGS, reference).run_samples(rows)
+    assert not trace['alarm'].any()
+
+
+def test_wrong_samples_of_both_pressures_in_a_row_are_no_process_fault(reference):
+    """Nothing moves P1 for one second and P2 for the next; what stays away is a fault."""
+    state, known = np.zeros(1, MONITOR), reference.copy()
+    known['drop'], known['swing'] = 0.2, 0.05
+    s = state[0]
+    s.level[:] = math.nan
+
+    def told(p1: float, p2: float) -> float:
+        return process_residual(s, known[0], p1, p2, math.nan)
+
+    assert [told(0.9, 0.6) for _ in range(3)] == [0.0, 0.0, 0.0]
+    assert [told(0.9, 0.8), told(0.7, 0.6), told(0.9, 0.6)] == [1.0, 0.0, 0.0]
+    assert [told(0.7, 0.6), told(0.7, 0.6), told(0.7, 0.8)] == [1.0, 1.0, 1.0]

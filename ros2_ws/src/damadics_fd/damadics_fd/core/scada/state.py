@@ -122,7 +122,7 @@ class MonitorState(Record):
     track: StemTrack
     xs: float  # slow copy of the stem law
     xq: float  # quick copy
-    last: Annotated[Floats, 3, 5]  # CV, X, P1, P2, F of this sample and the two before
+    last: Annotated[Floats, 4, 5]  # CV, X, P1, P2, F of this sample and the three before
     repeats: int  # samples in a row that are the one before
     size: float
     f_lagged: float
@@ -143,8 +143,11 @@ class MonitorState(Record):
     lever: Annotated[Floats, 2]  # standard error there over that in the middle
     air_doubt: float  # what the air that was found adds to that of r1
     saved: Annotated[Floats, N_TESTS, 2]  # statistics before a jump that may be a spike
+    saved_llr: float
     jumped: Annotated[Ints, N_RESIDUALS]
+    far_before: Annotated[Floats, N_RESIDUALS]  # how far the last one was, sigma
     spikes: Annotated[Ints, N_RESIDUALS]
+    process: int  # which pressures were far from their level which way, as bits
     doubtful: Annotated[Ints, 2]  # the last P1, P2 was not believed
     occurrence: int
     t_raised: float  # of the present occurrence; t_alarm is the first one's

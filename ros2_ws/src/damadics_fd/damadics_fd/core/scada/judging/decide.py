@@ -10,7 +10,7 @@ from damadics_fd.core.jit import jit
 from damadics_fd.core.scada.judging.cusum import FRICTION_TEST, QUICK, R1, R2, TEST_RESIDUAL, TESTS
 from damadics_fd.core.scada.judging.leverage import more_unsure
 from damadics_fd.core.scada.judging.roughness import rougher
-from damadics_fd.core.scada.judging.spikes import reject_spikes
+from damadics_fd.core.scada.judging.spikes import ALONE, reject_spikes
 from damadics_fd.core.scada.laws.stem_law import shrink
 from damadics_fd.core.scada.state import LAW, N_RESIDUALS, N_TESTS, MonitorState, Reference
 
@@ -25,6 +25,7 @@ SCALES = np.array([2 if test.block >= 30 else 1 for test in TESTS])  # of the ro
 # after the fault: by how quick the test is.
 CAPS = (3.0, 1.2, 1.05)
 ONE_SAMPLE = 0.8  # of a limit, the most that a single sample brings
+ALMOST = 0.99  # of a limit, the most that one brings it to that may be a spike
 # How long a residual must be testable in a row, without evidence, until its fault has gone.
 RECOVERY_S, FEWEST_GOOD = 60.0, 30  # s, samples
 # A fault that shows now and then, as when the stem turns, must stay away longer every time.
@@ -95,9 +96,10 @@ def decide(s: MonitorState, ref: Reference) -> None:
                     s.stretch[i, side, 0] = 0.0
                     s.stretch[i, side, 1] = 0.0
                     s.stretch[i, side, 2] = 0.0
-                s.g[i, side] = min(
-                    g, CAPS[0 if ref.k[i] > 1.0 else 1 if ref.k[i] >= QUICK else 2] * ref.h[i]
-                )
+                cap = CAPS[0 if ref.k[i] > 1.0 else 1 if ref.k[i] >= QUICK else 2]
+                if s.jumped[r] == ALONE and s.g[i, side] < ref.h[i]:
+                    cap = ALMOST
+                s.g[i, side] = min(g, cap * ref.h[i])
         side = 0 if s.g[i, 0] >= s.g[i, 1] else 1
         s.ratios[i] = s.g[i, side] / ref.h[i]
         if s.ratios[i] > top:
@@ -200,8 +202,9 @@ def test_friction(s: MonitorState, ref: Reference) -> None:
         # away from where it was learned the bias of the model may favour the wider play
         unsure = ref.se[FIRST_OF_R1] * (s.lever[R1] - 1.0 + s.air_doubt)
         gain = (0.5 * (z1 * z1 - z1d * z1d) - abs(wider) * unsure) / ref.kap2
+        cap = ALMOST if s.jumped[R1] == ALONE and s.llr < ref.llr_limit else CAPS[0]
         s.llr, s.llr_before = weigh(s.llr, s.llr_before, gain, wider)
-        s.llr = min(s.llr, CAPS[0] * ref.llr_limit)
+        s.llr = min(s.llr, cap * ref.llr_limit)
         if s.llr <= 0.0:
             s.llr = 0.0
             s.llr_zero = s.t

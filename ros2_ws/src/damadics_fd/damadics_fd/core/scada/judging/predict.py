@@ -21,7 +21,7 @@ from damadics_fd.core.scada.judging.pressure import (
     predict_pressure,
     push,
 )
-from damadics_fd.core.scada.judging.spikes import cv_came_back
+from damadics_fd.core.scada.judging.spikes import cv_came_back, cv_jumped
 from damadics_fd.core.scada.laws.actuator import nominal_flow
 from damadics_fd.core.scada.laws.flow_law import characteristic, sizing
 from damadics_fd.core.scada.laws.stem_law import advance_track, position
@@ -34,6 +34,7 @@ STRANGE = 20  # samples in a row
 SLOW_METER_S = 5.0  # a record in which the flow hardly moves does not tell the meter's lag
 METER_LAGS = 3.0  # after a gap, until a flow meter shows the flow
 COPIES = 2  # rows in a row that may be copies
+AWAY_PERIODS = 1.5  # that a wrong CV may stay away
 BLIND = 2  # samples without a pressure that the stated stem is carried over
 
 
@@ -58,6 +59,7 @@ def count_repeats(s: MonitorState, cv: float, x: float, p1: float, p2: float, fl
         before = s.last[0, i]
         if value != before and not (math.isnan(value) and math.isnan(before)):
             same = False
+        s.last[3, i] = s.last[2, i]
         s.last[2, i] = s.last[1, i]
         s.last[1, i] = before
         s.last[0, i] = value
@@ -157,6 +159,8 @@ def predict(
         s.t_flow = max(s.t_flow, t + METER_LAGS * max(ref.flow_law.lag_s, ref.period))
     if cv_came_back(s, ref):
         bridge(s, ref, t)
+    elif cv_jumped(s, ref):
+        s.t_stem = max(s.t_stem, t + AWAY_PERIODS * ref.period)
     if not repeated(s) and not stands_still(s, ref):
         advance_track(s.track, ref.stem_law, t, cv)
     law = ref.stem_kind == LAW

@@ -221,6 +221,10 @@ def process_residual(s: MonitorState, ref: Reference, p1: float, p2: float, flow
     fell2 = d2 < -ref.swing[1] and more >= 0.0
     rose2 = d2 > ref.swing[1] and more <= 0.0
     far = fell or rose or fell2 or rose2
+    before = s.process
+    s.process = (1 if fell else 0) + (2 if rose else 0) + (4 if fell2 else 0) + (8 if rose2 else 0)
+    # wrong samples of two pressures in a row are not one that stays away
+    lasts = far and (before == 0 or (before & s.process) > 0)
     share = 1.0 - math.exp(-dt / (FOLLOW_FAR_S if far else FOLLOW_S))
     s.level[0] += share * d1
     s.level[1] += share * d2
@@ -228,4 +232,4 @@ def process_residual(s: MonitorState, ref: Reference, p1: float, p2: float, flow
         if math.isnan(s.level_flow):
             s.level_flow = flow
         s.level_flow += share * (flow - s.level_flow)
-    return 1.0 if far else 0.0
+    return 1.0 if lasts else 0.0
