@@ -9,7 +9,7 @@ from damadics_fd.core.scada.judging.cusum import P1, P2, PROCESS, QUICK, R1, R2,
 from damadics_fd.core.scada.judging.leverage import lever
 from damadics_fd.core.scada.judging.predict import repeated, stands_still
 from damadics_fd.core.scada.judging.roughness import follow_roughness
-from damadics_fd.core.scada.laws.flow_law import flow_doubt, slope
+from damadics_fd.core.scada.laws.flow_law import END, flow_doubt, near_end, slope
 from damadics_fd.core.scada.laws.stem_law import outside, shrink, stem_doubt, transient_doubt
 from damadics_fd.core.scada.state import (
     HISTORY_LENGTH,
@@ -39,8 +39,6 @@ STEM_DRIFT = 0.02  # of the stroke
 FLOW_DRIFT = 0.1  # of log F
 STEM_TOLD, FLOW_TOLD = 0.005, 0.05  # drifts that are told
 CALM = 0.5  # of a limit of a quick test: nothing speaks of a fault
-END = 0.985  # of the meter's range: it shows no more
-AT_END, LEAST_END = 4.0, 0.9  # deviations of its noise below that, but not below this share
 SEAT = 0.03  # of the stroke, so near to its seat a plug throttles as it likes
 LEAST = 0.03  # of the meter's range: it shows no less
 AGAIN = 2  # times that the largest flow of all was shown: the end of its range
@@ -173,8 +171,7 @@ def flow_residual(s: MonitorState, ref: Reference, x: float, flow: float) -> flo
     top = law.range
     if s.top_count >= AGAIN and s.top_flow >= END * ref.flow_max:
         top = min(top, s.top_flow) if top > 0.0 else s.top_flow
-    near = max(min(END * top, top - AT_END * law.noise), LEAST_END * top)
-    ended = top > 0.0 and flow >= near
+    ended = top > 0.0 and flow >= near_end(top, law.noise)
     if ended or max(x, s.xm[0]) > 1.0 - SEAT:
         low = -math.inf  # the flow may be anything above what is shown
     elif flow < LEAST * scale:

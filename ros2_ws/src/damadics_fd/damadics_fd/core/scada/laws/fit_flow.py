@@ -14,7 +14,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from damadics_fd.core.scada.laws.flow_law import FLOW_LAW, GAS, KNOTS, LIQUID, STEP, sizing
+from damadics_fd.core.scada.laws.flow_law import (
+    FLOW_LAW,
+    GAS,
+    KNOTS,
+    LIQUID,
+    STEP,
+    near_end,
+    sizing,
+)
 from damadics_fd.core.scada.laws.robust import Floats, effective, huber_weights, spread_of
 
 SLOPE, SLOPE_SPREAD = -4.0, 2.0
@@ -122,7 +130,7 @@ def fit_flow(
     scale = flow_range or float(np.nanquantile(flow, 0.999)) if np.isfinite(flow).any() else 0.0
     if not scale > 0.0:
         return None
-    high = 0.985 * flow_range if flow_range else math.inf
+    high = near_end(flow_range, _white(flow)) if flow_range else math.inf
     good = np.isfinite(flow + size) & (flow > LEAST_FLOW * scale) & (flow < high)
     good &= x < 1.0 - 0.5 * STEP
     if good.sum() < 100:

@@ -23,6 +23,8 @@ LIQUID, GAS = range(2)
 LEAST_DROP = 1e-4  # of the inlet pressure: below it there is nothing to divide by
 CRITICAL = 0.7  # x_T, ratio of the pressure drop at which a globe valve chokes on gas
 RECOVERY = 0.81  # F_L^2 of a globe valve
+END = 0.985  # of the meter's range: it shows no more
+AT_END, LEAST_END = 4.0, 0.9  # deviations of its noise below that, but not below this share
 
 
 class FlowLaw(Record):
@@ -62,6 +64,17 @@ def sizing(medium: int, p1: float, p2: float, t1: float) -> float:
     vapour = vapour_pressure(max(celsius, -70.0))
     allowed = max(RECOVERY * (inlet - 0.95 * vapour), LEAST_DROP * inlet)
     return 0.5 * math.log(min(drop, allowed) * density(celsius, inlet))
+
+
+@jit
+def near_end(top: float, noise: float) -> float:
+    """
+    Return the flow from which a meter may be at its end, where any flow shows as this one.
+
+    >>> near_end(1.0, 0.0), near_end(1.0, 0.01), near_end(1.0, 0.1)
+    (0.985, 0.96, 0.9)
+    """
+    return max(min(END * top, top - AT_END * noise), LEAST_END * top)
 
 
 @jit
