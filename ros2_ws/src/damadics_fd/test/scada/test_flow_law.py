@@ -59,3 +59,27 @@ def test_a_line_learned_near_the_end_of_the_meter_is_unsure_far_below(seed):
     monitor = ScadaMonitor(SETTINGS, reference)
     low = driven(600, seed + 50, centre=0.85, swing=0.3)
     assert not monitor.run_samples(low)['alarm'].any()
+
+
+NOISE = 0.007  # of a meter that is at its end below 0.45 of the stroke
+
+
+def at_the_end(seed):
+    """Return t, X', X, F' of a valve whose noisy meter is at its end for half of the time."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(7200.0)
+    x = 0.45 + 0.2 * np.sin(2.0 * np.pi * t / 400.0)
+    shown = np.minimum(np.exp(-6.0 * (x - 0.45)), 1.0)
+    flow = np.clip(shown + NOISE * rng.normal(size=len(t)), 0.0, 1.0)
+    return t, x + NOISE * rng.normal(size=len(t)), x, flow
+
+
+@pytest.mark.parametrize('seed', range(4))
+def test_noise_below_the_end_of_a_meter_is_not_the_flow(seed):
+    t, measured, x, flow = at_the_end(seed)
+    fit = fit_flow(t, measured, x, np.zeros(len(t)), flow, 1.0)
+    assert fit is not None
+    law = fit.law[0]
+    for place in (0.3, 0.4):
+        below = -6.0 * (place - 0.45) - characteristic(law, place)
+        assert below < SIGMAS * flow_doubt(law, place, float(law['size0']))

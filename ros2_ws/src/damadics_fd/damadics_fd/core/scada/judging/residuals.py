@@ -171,7 +171,12 @@ def flow_residual(s: MonitorState, ref: Reference, x: float, flow: float) -> flo
     top = law.range
     if s.top_count >= AGAIN and s.top_flow >= END * ref.flow_max:
         top = min(top, s.top_flow) if top > 0.0 else s.top_flow
-    ended = top > 0.0 and flow >= near_end(top, law.noise)
+    near = near_end(top, law.noise)
+    ended = top > 0.0 and flow >= near
+    sigma = s.sq
+    if top > 0.0 and low > near:  # this is all that it can show, with the noise that is left there
+        low = near
+        sigma = math.hypot(law.noise, top * law.spread)
     if ended or max(x, s.xm[0]) > 1.0 - SEAT:
         low = -math.inf  # the flow may be anything above what is shown
     elif flow < LEAST * scale:
@@ -187,7 +192,7 @@ def flow_residual(s: MonitorState, ref: Reference, x: float, flow: float) -> flo
     elif flow < low:
         value = flow - low
     s.testable[R2] = 1 if value != 0.0 or not ended else 0
-    return value / s.sq
+    return value / sigma
 
 
 @jit

@@ -18,6 +18,7 @@ from damadics_fd.core.scada.laws.flow_law import (
     FLOW_LAW,
     GAS,
     KNOTS,
+    LEAST_END,
     LIQUID,
     STEP,
     near_end,
@@ -39,6 +40,7 @@ AVERAGED = 5  # samples
 SLOW_CHANGE, SLOW_S = 0.01, 300.0
 MOVING = 0.01  # of the stroke between position and its longest lag: there a lag shows
 FEWEST_MOVING = 30  # samples
+FEWEST = 100  # samples that tell a law
 
 
 @dataclass(frozen=True)
@@ -130,10 +132,11 @@ def fit_flow(
     scale = flow_range or float(np.nanquantile(flow, 0.999)) if np.isfinite(flow).any() else 0.0
     if not scale > 0.0:
         return None
-    high = near_end(flow_range, _white(flow)) if flow_range else math.inf
+    noise = _white(flow, LEAST_END * flow_range if flow_range else math.inf)
+    high = near_end(flow_range, noise) if flow_range else math.inf
     good = np.isfinite(flow + size) & (flow > LEAST_FLOW * scale) & (flow < high)
     good &= x < 1.0 - 0.5 * STEP
-    if good.sum() < 100:
+    if good.sum() < FEWEST:
         return None
     moving = np.abs(x - smooth(x, t, LAGS[-1]))[good] > MOVING
     seen = np.count_nonzero(moving) >= FEWEST_MOVING
@@ -146,7 +149,7 @@ def fit_flow(
     law = np.zeros(1, FLOW_LAW)
     law['medium'], law['c'], law['lag_s'], law['range'] = medium, c, LAGS[shown], flow_range
     law['size0'] = float(np.mean(size[good]))
-    law['noise'] = max(METER * scale, _white(flow))
+    law['noise'] = max(METER * scale, noise)
     law['spread'] = max(spread, 1e-3)
     law['v'][0, :KNOTS, :KNOTS] = v
     law['v'][0, KNOTS, KNOTS] = _exponent_doubt(left, size - law['size0'][0]) ** 2
@@ -213,9 +216,15 @@ def _fit(
     return 1.4826 * float(np.median(np.abs(slow[moving]))), c, v, full, spread
 
 
-def _white(flow: Floats) -> float:
-    """Return the standard deviation of the noise in a flow from sample to sample."""
-    noise = spread_of(flow[1:-1] - 0.5 * (flow[:-2] + flow[2:])) / math.sqrt(1.5)
+def _white(flow: Floats, below: float) -> float:
+    """
+    Return the standard deviation of the noise in a flow from sample to sample.
+
+    :param below: at its end a meter cuts off half of it: only flows below this count, if enough.
+    """
+    off = flow[1:-1] - 0.5 * (flow[:-2] + flow[2:])
+    far = np.maximum(np.maximum(flow[:-2], flow[1:-1]), flow[2:]) < below
+    noise = spread_of(off[far] if np.count_nonzero(far) >= FEWEST else off) / math.sqrt(1.5)
     return noise if math.isfinite(noise) else 0.0
 
 
