@@ -27,14 +27,13 @@ from rclpy.qos import QoSProfile
 QUIET = 0.012  # s that the loop of `promised` takes on the machine that the times are promised on
 PATIENCE = 120.0  # s for what takes a second or two: a busy machine is no failure
 PYTEST = 'PYTEST_CURRENT_TEST'  # a page as a process takes it for a test of its own
-SERVERS = ('connect', 'page')  # folders whose tests start servers
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark the tests of the page and of the connectors: they run beside those of the nodes."""
+    """Mark the tests of the page: they run beside those of the nodes and the connectors."""
     for item in items:
-        if item.path.parent.name in SERVERS:
-            item.add_marker(pytest.mark.servers)
+        if item.path.parent.name == 'page':
+            item.add_marker(pytest.mark.page)
 
 
 class Peer:

@@ -1,6 +1,6 @@
 #!/bin/bash
-# Run all tests in two streams side by side: those of running nodes, which wait most of their time,
-# and all others, first what starts nothing, at low priority, then page and connectors.
+# Run all tests in two streams side by side: those of running nodes and connectors, which wait most
+# of their time, and all others, first what starts nothing, at low priority, then the page.
 # What is given is passed on to pytest.
 set -uo pipefail
 cd "$(dirname "$0")/.."
@@ -19,7 +19,7 @@ sys.exit(ending(lambda: int(pytest.main())))
 beside() {
   (renice -n 5 "$BASHPID" > /dev/null; stream others 'not slow and not ros' "$@")
   others=$?
-  stream servers 'not slow and ros and servers' "$@"
+  stream page 'not slow and ros and page' "$@"
   merged "$others" $?
 }
 
@@ -34,10 +34,10 @@ merged() {
 
 output=$(mktemp)
 trap 'kill "${beside:-}" 2> /dev/null; rm -f "$output"' EXIT
-echo 'Testing in two streams: the nodes here, all others beside it (shown when they are done) ...'
+echo 'Testing in two streams: nodes and connectors here, all others beside it (shown when done) ...'
 beside "$@" > "$output" 2>&1 &
 beside=$!
-stream nodes 'not slow and ros and not servers' "$@"
+stream nodes 'not slow and ros and not page' "$@"
 nodes=$?
 wait "$beside"
 rest=$?
