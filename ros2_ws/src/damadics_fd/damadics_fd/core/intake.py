@@ -12,6 +12,7 @@ from damadics_fd.core.quality import (
     NOT_FINITE,
     OUT_OF_RANGE,
     REASONS,
+    SPIKE,
     Quality,
     Reason,
     Refused,
@@ -124,6 +125,9 @@ class Intake:
                     signal = SIGNALS[index]
                     text = f'{signal} = {value:g}'
                     break
+        elif reason == SPIKE:
+            index = int(self.quality['spike'][0])
+            signal, text = SIGNALS[index], f'{SIGNALS[index]} = {values[index]:g}'
         self.refused = Refused(Reason(reason), f'{REASONS[reason]}: {text}', signal)
         return self.refused
 

@@ -21,10 +21,11 @@ class Reason(IntEnum):
     ZERO_STAMP = 3
     DUPLICATE = 4
     OUT_OF_ORDER = 5
+    SPIKE = 6
 
 
 REASONS = tuple(reason.name.lower() for reason in Reason)
-ACCEPTED, NOT_FINITE, OUT_OF_RANGE, ZERO_STAMP, DUPLICATE, OUT_OF_ORDER = map(int, Reason)
+ACCEPTED, NOT_FINITE, OUT_OF_RANGE, ZERO_STAMP, DUPLICATE, OUT_OF_ORDER, SPIKE = map(int, Reason)
 BEYOND = 1e9  # degC or kg/s: the mark of a corrupt sample
 EXPLANATIONS = {
     'not_finite': 'a needed signal is missing, NaN or infinite',
@@ -32,6 +33,7 @@ EXPLANATIONS = {
     'zero_stamp': 'header.stamp is 0: the driver does not stamp its samples',
     'duplicate': 'header.stamp equals that of the sample before',
     'out_of_order': 'header.stamp is before that of the sample before',
+    'spike': 'a signal was another for one sample, by more than a valve can do',
 }
 REMEDIES = {
     'not_finite': 'check its transmitter and wiring; what the mode does not need may be NaN',
@@ -39,6 +41,7 @@ REMEDIES = {
     'zero_stamp': 'let the driver stamp its samples',
     'duplicate': 'let one driver only send, each sample once',
     'out_of_order': 'let one driver only send, in order of time',
+    'spike': 'check wiring, screen and earth of its transmitter',
 }
 
 
@@ -90,6 +93,15 @@ class Quality(Record):
     refused_in_a_row: int
     jump_stamp: int
     jump_count: int  # samples in order after a clock set back
+    x1: float  # of the last accepted sample in mode monitor
+    p1: float
+    p2: float
+    ps: float
+    spike: int  # place in SIGNALS of what was another for one sample last, see `spikes`
+    held_x1: float  # of a sample that is held back, NaN where none is
+    held_p1: float
+    held_p2: float
+    held_ps: float
 
 
 @jit

@@ -32,6 +32,7 @@ from damadics_fd.commands.commission.verdict import (
     smallest,
     unchecked,
 )
+from damadics_fd.commands.commission.wrong import told, without_wrong_samples
 from damadics_fd.core.monitor import run
 from damadics_fd.core.result import Columns, Result
 from damadics_fd.core.settings import Settings
@@ -112,6 +113,7 @@ def identify(
     """
     for recording in recordings:
         check_units(recording.columns)
+    recordings, wrong = without_wrong_samples(recordings)
     signals = gather(recordings)
     check_directions(blocks(signals, BLOCK), _flow(recordings, signals))
     if signals.rate < MIN_RATE:
@@ -130,7 +132,8 @@ def identify(
             hysteresis_std=float(f'{start.hysteresis_std:.2g}'),
         )
         balance = replace(balance, settings=settings)
-    return _propose(recordings, base, given, days, balance, dead)
+    proposal = _propose(recordings, base, given, days, balance, dead)
+    return replace(proposal, remarks=(*told(wrong), *proposal.remarks))
 
 
 def _propose(

@@ -13,6 +13,7 @@ from damadics_fd.core.modes import MONITOR, PAPER, PHASE_PAPER
 from damadics_fd.core.quality import Quality
 from damadics_fd.core.record import Floats, Ints, Rows
 from damadics_fd.core.settings import Settings
+from damadics_fd.core.spikes import is_spike
 from damadics_fd.core.valve import force
 
 SUBSTEPS = 1000  # at most, in one gap
@@ -107,6 +108,12 @@ def step(
     reason = quality.check_values(c, cv, x1, p1, p2, t1, flow, ps)
     if reason == quality.ACCEPTED:
         reason = quality.check_stamp(q, c, stamp)
+    if (
+        reason == quality.ACCEPTED
+        and c.mode_code == MONITOR
+        and is_spike(q, c, stamp, x1, p1, p2, ps)
+    ):
+        reason = quality.SPIKE
     first = q.counts[quality.ACCEPTED] == 0
     dt, afresh = quality.admit(q, c, stamp, reason)
     if reason != quality.ACCEPTED:

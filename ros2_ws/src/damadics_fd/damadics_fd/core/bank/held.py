@@ -94,7 +94,9 @@ class Held:
         row = self.refused[v]
         if row.reason == ACCEPTED:
             return None
-        return Intake(self.of(v)).note(
+        intake = Intake(self.of(v))
+        intake.quality = self.quality[v : v + 1]
+        return intake.note(
             int(row.reason), int(row.stamp), row['values'].tolist(), int(row.before)
         )
 
