@@ -66,7 +66,8 @@ def test_the_nodes_give_what_the_core_gives_bit_for_bit(chain):
     others = {'p1': 3.5e6, 'p2': 2.6e6, 't1': 20.0, 'flow': 5.0, 'ps': 1e5}
     full = {name: np.full(1200, value) for name, value in others.items()}
     result = run({**columns, **full}, Settings.for_mode('paper'))
-    assert chain.wait(lambda: len(chain.got['estimate']) == 1200)
+    heard = ('estimate', 'residual', 'threshold')
+    assert chain.wait(lambda: all(len(chain.got[topic]) == 1200 for topic in heard))
     assert [m.xi2 for m in chain.got['estimate']] == result.estimates['xi2'].tolist()
     assert [m.x2 for m in chain.got['estimate']] == result.estimates['x2'].tolist()
     assert [m.data for m in chain.got['residual']] == result.decisions['residual'].tolist()

@@ -7,13 +7,13 @@ from numpy.typing import NDArray
 
 from damadics_fd.core import quality
 from damadics_fd.core.approximator import learning, network, observer, transmitter, velocity
+from damadics_fd.core.approximator.spikes import is_spike
 from damadics_fd.core.approximator.state import Estimate, State
 from damadics_fd.core.jit import jit, layer
 from damadics_fd.core.modes import MONITOR, PAPER, PHASE_PAPER
 from damadics_fd.core.quality import Quality
 from damadics_fd.core.record import Floats, Ints, Rows
 from damadics_fd.core.settings import Settings
-from damadics_fd.core.spikes import is_spike
 from damadics_fd.core.valve import force
 
 SUBSTEPS = 1000  # at most, in one gap

@@ -14,10 +14,10 @@ from damadics_fd.core.jit import jit
 from damadics_fd.core.quality import Quality
 from damadics_fd.core.settings import Settings
 
-# By how much a signal may differ from the last good one, as a share of its range: at once (less
-# raises no alarm), and per second that has passed (a full stroke takes 0.2 s at least).
-X_STEP, PS_STEP, P_STEP = 0.125, 0.02, 0.04
-X_RATE, PS_RATE, P_RATE = 5.0, 2.0, 5.0
+# By how much a signal may differ from the last good one, as a share of its range: at once, and per
+# second that has passed. A spring that breaks throws the stem; pressures take their time.
+X_STEP, PS_STEP, P_STEP = 0.05, 0.02, 0.04
+X_RATE, PS_RATE, P_RATE = 20.0, 2.0, 5.0
 CONFIRMED = 0.75  # of the way from there, that it may be off where the sample before had it
 X1, P1, P2, PS = 1, 2, 3, 6  # places in SIGNALS
 
