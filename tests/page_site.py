@@ -37,10 +37,23 @@ def axe_source() -> str:
     return Path(axe_playwright_python.__file__).with_name('axe.min.js').read_text('utf-8')
 
 
+def violations(page: Any) -> dict[str, Any]:
+    """Return what axe-core says of the page as it stands."""
+    page.evaluate(axe_source())
+    return page.evaluate('axe.run(document, {resultTypes: ["violations"]})')
+
+
 def serious(page: Any) -> list[str]:
     """List the violations of class serious or above that axe-core finds."""
-    page.evaluate(axe_source())
-    found = page.evaluate('axe.run(document, {resultTypes: ["violations"]})')
+    from playwright.sync_api import Error
+
+    try:
+        found = violations(page)
+    except Error as error:
+        if 'Execution context was destroyed' not in str(error):
+            raise
+        page.wait_for_timeout(3000)  # it lost its server for a while, and has loaded anew
+        found = violations(page)
     return [
         f'{v["id"]}: {json.dumps([n["html"][:160] for n in v["nodes"]][:3])}'
         for v in found['violations']
