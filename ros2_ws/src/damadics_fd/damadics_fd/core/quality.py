@@ -97,9 +97,7 @@ class Quality(Record):
     p1: float
     p2: float
     ps: float
-    spike: (
-        int  # place in SIGNALS of what was another for one sample last, see `approximator.spikes`
-    )
+    spike: int  # place in SIGNALS of the last one that was wrong alone
     held_x1: float  # of a sample that is held back, NaN where none is
     held_p1: float
     held_p2: float

@@ -5,6 +5,7 @@
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from damadics_fd.commands.commission.signals import NEEDED
 from damadics_fd.core.record import Floats
@@ -16,9 +17,7 @@ OF_CV = 0.02  # of the stroke: CV knows no noise
 SPREAD = 2.0  # share of the samples on either side that its spread leaves out, %
 
 
-def wrong_samples(
-    values: Floats, least: float = 0.0
-) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def wrong_samples(values: Floats, least: float = 0.0) -> NDArray[np.bool_]:
     """
     Find samples that were another, far off, and that the next has come back from.
 
