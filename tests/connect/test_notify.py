@@ -5,12 +5,14 @@
 import json
 import subprocess
 import time
+from contextlib import closing
 
 import pytest
 from conftest import PATIENCE
 from connect.detectors import Detectors
 from connect.servers import Server, wait_for
 from damadics_bringup.processes import executable
+from damadics_connect.notify.spool import Spool
 from damadics_msgs.msg import FaultEvent
 
 pytestmark = pytest.mark.ros
@@ -29,6 +31,11 @@ def mails(server) -> list[dict]:
     if not server.path.exists():
         return []
     return [json.loads(line) for line in server.path.read_text().splitlines()]
+
+
+def waiting(folder) -> int:
+    with closing(Spool(folder / 'spool.sqlite')) as spool:
+        return spool.count()
 
 
 def configure(folder, server) -> str:
@@ -54,6 +61,8 @@ def test_nothing_is_lost_while_the_network_is_away_and_nothing_is_told_twice(
         assert mails(mail)[0]['subject'] == '[DAMADICS FD] LV1: alarm'
         assert 'friction up Bcc: all@plant.example' in mails(mail)[0]['body']
         assert mails(mail)[0]['to'] == ['shift@plant.example']
+        # a server that dies before it has said that it took the message gets it once more
+        assert wait_for(lambda: waiting(tmp_path) == 0), log.read_text()
 
         mail.kill()
         detectors.judge('lv1', FaultEvent.CLEARED)
