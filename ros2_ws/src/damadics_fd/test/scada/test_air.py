@@ -36,6 +36,33 @@ def test_a_little_air_is_found_when_there_is_more_to_look_at(reference):
     assert monitor.state.air_doubt < 1.0
 
 
+@pytest.mark.parametrize('seed', [22, 31, 36, 42])
+def test_what_was_found_is_not_forgotten_where_later_motion_tells_little(reference, seed):
+    monitor = ScadaMonitor(LATE, reference)
+    trace = monitor.run_samples(driven(2300, seed, air=1.05))
+    assert not trace['alarm'].any()
+    assert math.exp(float(monitor.state.air)) == pytest.approx(1.05, abs=0.015)
+
+
+def test_air_that_was_found_leaves_what_a_short_record_may_not_have_shown(reference):
+    monitor = ScadaMonitor(LATE, reference)
+    assert not monitor.run_samples(driven(900, 45, air=1.08))['alarm'].any()
+    assert math.exp(float(monitor.state.air)) == pytest.approx(1.08, abs=0.015)
+
+
+def test_what_later_motion_does_not_confirm_is_given_up_in_the_end(reference):
+    rows = driven(2300, 21, swing=0.02)
+    monitor = ScadaMonitor(LATE, reference)
+    monitor.run_samples(rows[:800])
+    assert int(monitor.state.air_looks) == 2
+    monitor.state.air, monitor.state.air_nats = 0.02, 6.0
+    monitor.run_samples(rows[800:2000])
+    assert float(monitor.state.air) == 0.02
+    monitor.run_samples(rows[2000:])
+    assert int(monitor.state.air_looks) == 3
+    assert float(monitor.state.air) == 0.0
+
+
 def test_a_plant_that_has_been_running_is_learned_as_it_is(reference):
     running = learn(driven(270, seed=1, air=1.1), SETTINGS)
     assert 0.0 <= reference['air'][0] < 0.01

@@ -117,6 +117,7 @@ class MonitorState(Record):
     air: float  # logarithm of the air that was found at the start, see judging/air.py
     air_looks: int  # that were taken at it
     air_count: int  # samples since the last one
+    air_nats: float  # by which the air that was found is likelier than none
     air_fit: Annotated[Floats, TRIALS + 1, 3]  # sums over them, see judging/air.py
     air_x: Annotated[Floats, TRIALS]  # scratch
     track: StemTrack

@@ -28,17 +28,19 @@ from damadics_fd.core.scada.state import (
 
 LOOKS = (60, 560, 1440)  # samples of the first look, at least, and of the later, finer ones
 ARRIVED = 40  # samples after which a stem that began at rest is where it is sent
-EXPLAINED = 1.3  # of the variance that was learned: what is left is no other fault's
+EXPLAINED = 1.5  # of the variance that was learned: what is left is no other fault's
 # More air of the models that are compared, as a logarithm, by look; 0 is the one that is followed.
 OFFSETS = np.array(
-    [[-0.06, 0.0, 0.05, 0.1, 0.16, 0.23, 0.31]] + 2 * [[-0.05, 0.0, 0.05] + 4 * [math.nan]]
+    [[-0.06, 0.0, 0.05, 0.1, 0.16, 0.23, 0.31]] + 2 * [[-0.04, 0.0, 0.04] + 4 * [math.nan]]
 )
 MODELS = (7, 3, 3)  # of them, at most one more than TRIALS
 # Standard errors of r1 for air that was found: per its logarithm, and until the last look at it.
 OTHER_AIR, UNSETTLED = 10.0, 2.0
-# By which air that is found must be likelier than none: at first it is on trial, and nothing has
-# been tested yet; what shows late may be a fault that grows.
-NATS = (4.0, 6.0, 20.0)
+# By which air must be likelier than none, by look, when it is first found: nothing has been tested
+# yet at the first; what shows late may be a fault that grows. And for what was found to stay, by
+# all samples since the start.
+NATS, STAYS = (4.0, 6.0, 20.0), (4.0, 4.0, 8.0)
+STEPS = 64  # between the least and the most air that are compared
 E, EE, NEXT = range(3)  # sums over r1 of a model: itself, its square, times that of the next model
 
 
@@ -70,13 +72,14 @@ def seek_air(s: MonitorState, cfg: ScadaConfig, ref: Reference) -> None:
         return
     s.air_looks += 1
     learned = ref.s1 * ref.s1
-    best = max(likeliest(s, look), -ref.air - s.air)  # running takes air: never less than none
-    found, none = left_with(s, look, best), left_with(s, look, -s.air)
-    gain = 0.5 * n / ref.kap2 * math.log(none / max(found, 0.5 * learned))
-    likely = found < EXPLAINED * learned and gain > NATS[look]
-    if not likely or (look == 2 and s.air == 0.0 and best < 0.0):
-        best = -s.air  # what shows late, the other way, is something else
+    best = likeliest(s, ref, look)
+    if left_with(s, look, best) >= EXPLAINED * learned:
+        best = 0.0
+    nats = evidence(s, ref, look, best)
+    if nats <= (NATS if s.air == 0.0 else STAYS)[look]:
+        best, nats = -s.air, 0.0
     s.air += best
+    s.air_nats = nats
     for i in range(2):
         s.stem[i].m_a *= math.exp(best)
     s.air_doubt = 0.0
@@ -167,17 +170,31 @@ def between(one: float, other: float, both: float, share: float) -> float:
 
 
 @jit
-def likeliest(s: MonitorState, look: int) -> float:
-    """Return the more air that leaves least of r1, by straight lines between the models."""
-    best, least = 0.0, math.inf
-    for k in range(MODELS[look] - 1):
-        one, other, both = spread_between(s, k)
-        apart = one + other - 2.0 * both
-        share = min(max((one - both) / apart, 0.0), 1.0) if apart > 0.0 else 0.0
-        left = between(one, other, both, share)
-        if left < least:
-            least = left
-            best = OFFSETS[look, k] + share * (OFFSETS[look, k + 1] - OFFSETS[look, k])
+def evidence(s: MonitorState, ref: Reference, look: int, more: float) -> float:
+    """
+    Return by how much more air than now is likelier than none, nats.
+
+    What was found before counts with the samples that told it: a parabola that is 0 at none.
+    """
+    least = 0.5 * ref.s1 * ref.s1
+    none, left = max(left_with(s, look, -s.air), least), max(left_with(s, look, more), least)
+    before = s.air_nats * (1.0 - (more / s.air) ** 2) if s.air != 0.0 else 0.0
+    return before + 0.5 * s.air_count / ref.kap2 * math.log(none / left)
+
+
+@jit
+def likeliest(s: MonitorState, ref: Reference, look: int) -> float:
+    """Return the more air that all samples so far speak for; running takes air: none or more."""
+    low, high = OFFSETS[look, 0], OFFSETS[look, MODELS[look] - 1]
+    if look == 2 and s.air == 0.0:
+        low = 0.0  # what shows late, the other way, is something else
+    best, most = 0.0, -math.inf
+    for i in range(STEPS + 1):
+        more = low + (high - low) * i / STEPS
+        if more >= -ref.air - s.air:
+            nats = evidence(s, ref, look, more)
+            if nats > most:
+                best, most = more, nats
     return best
 
 

@@ -48,6 +48,7 @@ def begin_again(s: MonitorState, cfg: ScadaConfig, ref: Reference, t: float) -> 
         s.t_gone = t
         s.level[:] = math.nan
         s.air_looks = 0
+        s.air_nats = 0.0
 
 
 @jit

@@ -18,7 +18,7 @@ DAY_S = 86400.0
 LONG_RECORD = 3000  # samples below which the tails of r1 are not known well enough
 JUMP_CLIP = 6.0  # a jump must then last for three samples
 HEAD_ROOM = 1.3  # on the largest CUSUM of the learning record
-LLR_MARGINS = (1.6, 2.2)  # with stationary inputs, with wandering ones
+LLR_MARGINS = (1.35, 2.2)  # with stationary inputs, with wandering ones
 LLR_HEAD_ROOM = 2.0
 STATIONARY = 1.3  # sigma of 30 s blocks over sigma of samples, above it an input wanders
 # Standard errors of the learned mean by which the allowance grows, by length of block.
