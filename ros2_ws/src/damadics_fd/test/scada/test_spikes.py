@@ -1,6 +1,6 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Single wrong samples: of CV they move the model and not the stem, of others one residual."""
+"""Wrong samples: of CV they move the model and not the stem, of others one residual."""
 
 import math
 
@@ -15,7 +15,8 @@ from .driven import SETTINGS, driven
 
 CV = 1
 WRONG = slice(55, None, 30)
-STEPS = {'swing': 0.2, 'jump': 0.1}  # where CV jumps by itself, a jump is no reason to wait
+# CV jumps by itself, so that a jump is no reason to wait; the flow meter is not at its end.
+STEPS = {'swing': 0.2, 'jump': 0.1, 'centre': 0.66}
 
 
 @pytest.fixture(scope='module', params=[False, True], ids=['learned without', 'learned with'])
@@ -60,6 +61,56 @@ def test_a_wrong_sample_raises_nothing_however_far_a_statistic_has_come(
     rows[61::every, signal] = np.clip(rows[61::every, signal] + off, 0.0, 1.0)
     trace = ScadaMonitor(SETTINGS, reference).run_samples(rows)
     assert not trace['alarm'].any()
+
+
+@pytest.mark.parametrize(
+    ('signal', 'first', 'second'),
+    [(signal, a, b) for signal in (2, 3, 4) for a in (-0.1, 0.1) for b in (-0.1, 0.1)],
+)
+def test_two_wrong_samples_that_the_flow_knows_nothing_of_raise_nothing(
+    reference, signal, first, second
+):
+    rows = driven(400, seed=5, **STEPS)
+    for at in range(85, 400, 60):
+        rows[at : at + 2, signal] += first, second
+    trace = ScadaMonitor(SETTINGS, reference).run_samples(rows)
+    assert not trace['alarm'].any()
+
+
+def test_a_wrong_flow_and_a_wrong_position_after_it_raise_nothing(reference):
+    rows = driven(400, seed=5, **STEPS)
+    for at in range(85, 400, 60):
+        rows[at, 6] -= 0.2
+        rows[at + 1, 2] += 0.2
+    trace = ScadaMonitor(SETTINGS, reference).run_samples(rows)
+    assert not trace['alarm'].any()
+
+
+@pytest.mark.parametrize('fault', [{'f13': 0.25}, {'f17': 0.1}], ids=['X', 'P1'])
+def test_what_the_flow_answers_is_believed_with_the_second_sample(reference, fault):
+    trace = ScadaMonitor(SETTINGS, reference).run_samples(driven(300, 6, 155, **fault, **STEPS))
+    assert trace['t'][trace['alarm']][0] == 156.0
+
+
+@pytest.mark.parametrize(
+    ('signal', 'off'), [(2, 0.1), (3, -0.1), (4, -0.1)], ids=['X', 'P1', 'P2']
+)
+def test_what_stays_away_is_believed_without_the_flow_with_the_third(reference, signal, off):
+    rows = driven(300, seed=6, **STEPS)
+    rows[155:, signal] += off
+    trace = ScadaMonitor(SETTINGS, reference).run_samples(rows)
+    assert 155.0 < trace['t'][trace['alarm']][0] <= 157.0
+
+
+@pytest.mark.parametrize('lasts', [2, 40])
+def test_a_pressure_is_known_again_after_two_wrong_samples_and_after_a_step(reference, lasts):
+    rows = driven(300, seed=6, **STEPS)
+    rows[155 : 155 + lasts, 4] += 0.1
+    monitor = ScadaMonitor(SETTINGS, reference)
+    monitor.run_samples(rows[:157])
+    for row in rows[157:180]:
+        monitor.run_samples(row[None, :])
+        assert monitor.state.p_hat[1] == pytest.approx(row[4], abs=0.01)
 
 
 def test_wrong_samples_of_both_pressures_in_a_row_are_no_process_fault(reference):

@@ -149,7 +149,8 @@ class MonitorState(Record):
     far_before: Annotated[Floats, N_RESIDUALS]  # how far the last one was, sigma
     spikes: Annotated[Ints, N_RESIDUALS]
     process: int  # which pressures were far from their level which way, as bits
-    doubtful: Annotated[Ints, 2]  # the last P1, P2 was not believed
+    doubtful: Annotated[Ints, 2]  # whether the last P1, P2 was far and not, or yet, believed
+    instead: Annotated[Floats, 2, TAPS]  # what was past if the last two were wrong
     occurrence: int
     t_raised: float  # of the present occurrence; t_alarm is the first one's
     stood: bool

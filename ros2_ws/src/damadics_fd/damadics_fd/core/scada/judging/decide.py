@@ -97,7 +97,7 @@ def decide(s: MonitorState, ref: Reference) -> None:
                     s.stretch[i, side, 1] = 0.0
                     s.stretch[i, side, 2] = 0.0
                 cap = CAPS[0 if ref.k[i] > 1.0 else 1 if ref.k[i] >= QUICK else 2]
-                if s.jumped[r] == ALONE and s.g[i, side] < ref.h[i]:
+                if s.jumped[r] >= ALONE and s.g[i, side] < ref.h[i]:
                     cap = ALMOST
                 s.g[i, side] = min(g, cap * ref.h[i])
         side = 0 if s.g[i, 0] >= s.g[i, 1] else 1
@@ -202,7 +202,7 @@ def test_friction(s: MonitorState, ref: Reference) -> None:
         # away from where it was learned the bias of the model may favour the wider play
         unsure = ref.se[FIRST_OF_R1] * (s.lever[R1] - 1.0 + s.air_doubt)
         gain = (0.5 * (z1 * z1 - z1d * z1d) - abs(wider) * unsure) / ref.kap2
-        cap = ALMOST if s.jumped[R1] == ALONE and s.llr < ref.llr_limit else CAPS[0]
+        cap = ALMOST if s.jumped[R1] >= ALONE and s.llr < ref.llr_limit else CAPS[0]
         s.llr, s.llr_before = weigh(s.llr, s.llr_before, gain, wider)
         s.llr = min(s.llr, cap * ref.llr_limit)
         if s.llr <= 0.0:

@@ -5,6 +5,7 @@
 import math
 
 from damadics_fd.core.jit import jit
+from damadics_fd.core.scada.judging.fuse import filter_pressures
 from damadics_fd.core.scada.judging.gap import (
     GAP_PERIODS,
     SETTLING_PERIODS,
@@ -13,14 +14,7 @@ from damadics_fd.core.scada.judging.gap import (
     missing,
     restart,
 )
-from damadics_fd.core.scada.judging.pressure import (
-    GATE,
-    TAPS,
-    fuse_pressure,
-    innovation,
-    predict_pressure,
-    push,
-)
+from damadics_fd.core.scada.judging.pressure import predict_pressure
 from damadics_fd.core.scada.judging.spikes import cv_came_back, cv_jumped
 from damadics_fd.core.scada.laws.actuator import nominal_flow
 from damadics_fd.core.scada.laws.flow_law import characteristic, sizing
@@ -80,39 +74,6 @@ def repeated(s: MonitorState) -> bool:
 def stands_still(s: MonitorState, ref: Reference) -> bool:
     """Tell whether the record shows the same row for longer than it did while learning."""
     return s.repeats > max(COPIES, ref.longest_repeat)
-
-
-@jit
-def filter_pressures(s: MonitorState, ref: Reference, p1: float, p2: float) -> None:
-    """Fuse each pressure with its prediction; do not believe a single value far from it."""
-    s.innovation[:] = math.nan
-    for i in range(2):
-        measured = p1 if i == 0 else p2
-        filt = ref.pressure[i]
-        kept = measured
-        if math.isnan(measured):  # what comes after it is no continuation of what was before
-            s.past[i, :] = math.nan
-        elif math.isnan(s.past[i, 0]):
-            s.past[i, :] = measured
-            s.steady = 1
-        if math.isnan(measured) or s.filled < TAPS or not filt.sigma > 0.0:
-            s.p_hat[i] = measured
-            s.doubtful[i] = 0
-        else:
-            predicted = predict_pressure(filt, s.past[i])
-            far = abs(measured - predicted) > GATE * filt.sigma
-            if far and s.doubtful[i] == 0 and s.steady > TAPS:
-                s.doubtful[i] = 1
-                s.p_hat[i] = predicted
-                kept = predicted
-            else:
-                s.doubtful[i] = 0
-                s.p_hat[i] = fuse_pressure(filt, s.past[i], measured)
-            if s.steady > TAPS:
-                s.innovation[i] = innovation(filt, s.past[i], measured)
-        if math.isnan(kept):
-            continue
-        push(s.past[i], kept)
 
 
 @jit

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Learned linear predictors of a pressure: one to filter it by, one to test it against."""
 
+import math
 from typing import Annotated
 
 import numpy as np
@@ -40,6 +41,13 @@ def predict_pressure(filt: PressureFilter, past: np.ndarray) -> float:
 
 
 @jit
+def is_far(filt: PressureFilter, past: np.ndarray, measured: float) -> bool:
+    """Tell whether P'(k) is farther from its prediction than the noise takes it."""
+    far: bool = abs(measured - predict_pressure(filt, past)) > GATE * filt.sigma
+    return far
+
+
+@jit
 def innovation(filt: PressureFilter, past: np.ndarray, measured: float) -> float:
     """
     Return P'(k) less its prediction about the learned mean.
@@ -56,7 +64,7 @@ def innovation(filt: PressureFilter, past: np.ndarray, measured: float) -> float
 def fuse_pressure(filt: PressureFilter, past: np.ndarray, measured: float) -> float:
     """Return P^(k) = c P'(k) + (1-c) pr(k), or P'(k) itself where it jumped."""
     predicted = predict_pressure(filt, past)
-    if abs(measured - predicted) > GATE * filt.sigma:
+    if is_far(filt, past, measured):
         return measured
     return filt.c * measured + (1.0 - filt.c) * predicted
 
@@ -95,8 +103,31 @@ def learn_pressure(pressure: NDArray[np.float64], sigma: float, filt: PressureFi
     filt.sigma = error.std()
     mean = pressure.mean()
     design = np.column_stack([lagged - mean, np.ones(target.size)])
-    ridge = 0.05 * target.size * sigma**2 * np.diag([*np.ones(taps), 0.0])
-    weights = np.linalg.solve(design.T @ design + ridge, design.T @ (pressure[taps:] - mean))
+    weights = _as_many_as_earn_it(design, pressure[taps:] - mean, sigma, n < SHORT_RECORD)
     filt.mean = mean
-    filt.b[:taps] = weights[:taps]
-    filt.b0 = weights[taps]
+    filt.b[: weights.size - 1] = weights[:-1]
+    filt.b0 = weights[-1]
+
+
+def _as_many_as_earn_it(design: Floats, target: Floats, sigma: float, short: bool) -> Floats:
+    """
+    Fit taps and a constant; of a short record so many of the newest taps as Schwarz's BIC allows.
+
+    Taps that were fitted to nothing but noise make an innovation of which each is like the last,
+    and the sums of that are larger than they were while learning.
+
+    :param design: lagged values, the newest first, and a column of ones.
+    :return: weights, the constant last.
+    """
+    most = design.shape[1] - 1
+    best: Floats = np.zeros(1)
+    least = math.inf
+    for taps in range(most + 1) if short else (most,):
+        part = np.column_stack([design[:, :taps], design[:, -1]])
+        ridge = 0.05 * target.size * sigma**2 * np.diag([*np.ones(taps), 0.0])
+        weights = np.linalg.solve(part.T @ part + ridge, part.T @ target)
+        error = float(((target - part @ weights) ** 2).mean())
+        bic = target.size * math.log(max(error, 1e-300)) + taps * math.log(target.size)
+        if bic < least:
+            best, least = weights.astype(np.float64), bic
+    return best

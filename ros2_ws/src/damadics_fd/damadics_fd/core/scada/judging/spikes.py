@@ -1,19 +1,26 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Single wrong samples: what one of them brings is taken back when the next has come back."""
+"""
+Wrong samples: what one of them brings is taken back when the next has come back.
+
+Of X, P1 and P2 two in a row are waited for as well, while the flow tells that nothing has moved.
+"""
 
 import math
 
 from damadics_fd.core.jit import jit
-from damadics_fd.core.scada.judging.cusum import R1, TEST_RESIDUAL
+from damadics_fd.core.scada.judging.cusum import PROCESS, R1, R2, TEST_RESIDUAL
 from damadics_fd.core.scada.judging.roughness import rougher
 from damadics_fd.core.scada.state import N_RESIDUALS, N_TESTS, MonitorState, Reference
 
 JUMP = 6.0  # sigma from one sample to the next that may be a spike
 RETURNED = 0.3  # of a jump, by which the value may still be off when it has come back
 BACK = 4.0  # sigma within which it has come back
-FIRST, ALONE = 1, 2  # a jump that may be a spike; one out of calm, which raises no alarm by itself
-CV = 0  # place among the last samples of CV, X, P1, P2, F
+FAR_PROCESS = 0.5  # its residual is 0 or 1
+# A jump that may be a spike; one out of calm, which raises no alarm by itself; one that the next
+# sample has not taken back, but the flow does not know of.
+FIRST, ALONE, UNANSWERED = 1, 2, 3
+CV, X, P2, F = 0, 1, 3, 4  # places among the last samples of CV, X, P1, P2, F
 CV_SPIKE = 0.02  # of the stroke: smaller ones move the model of the stem by too little
 
 
@@ -49,27 +56,57 @@ def cv_jumped(s: MonitorState, ref: Reference) -> bool:
 
 @jit
 def taken_back(s: MonitorState, ref: Reference) -> bool:
-    """Tell whether any signal jumped with the sample before and has come back with this one."""
-    for i in range(CV + 1, 5):
-        if ref.spike[i] > 0.0 and came_back(s, i, ref.spike[i], 1):
+    """Tell whether any signal jumped one sample ago, or two, and has come back with this one."""
+    for i in range(X, F + 1):
+        least = ref.spike[i]
+        if least > 0.0 and (came_back(s, i, least, 1) or came_back(s, i, least, 2)):
             return True
     return cv_came_back(s, ref)
 
 
 @jit
+def off(s: MonitorState, i: int, ago: int) -> float:
+    """Return how far from its place two samples ago, and from the way it went, a signal was."""
+    place = s.last[2, i]
+    further = (2 - ago) * (place - s.last[3, i])
+    away: float = min(abs(s.last[ago, i] - place), abs(s.last[ago, i] - place - further))
+    return away
+
+
+@jit
+def unanswered(s: MonitorState, ref: Reference) -> bool:
+    """
+    Tell whether X, P1 or P2 has been away for two samples and the flow has not.
+
+    A stem or a pressure that moved would have moved the flow, as r2 says, and so would a
+    positioner that was deceived by its own transmitter.
+    """
+    if s.testable[R2] == 0 or math.isnan(s.residual[R2]) or abs(s.residual[R2]) < JUMP:
+        return False
+    if max(off(s, F, 0), off(s, F, 1)) > ref.spike[F]:
+        return False
+    for i in range(X, P2 + 1):
+        if ref.spike[i] > 0.0 and min(off(s, i, 0), off(s, i, 1)) > ref.spike[i]:
+            return True
+    return False
+
+
+@jit
 def reject_spikes(s: MonitorState, ref: Reference) -> None:
-    """Take back what a single sample brought that has come back at the next one."""
+    """Take back what a wrong sample brought, or two, when the signal has come back."""
     back = taken_back(s, ref)
+    waits = unanswered(s, ref)
     for r in range(N_RESIDUALS):
         value = s.residual[r]
         jumped = s.jumped[r]
         far = False
         calm = False
+        returned = FAR_PROCESS if r == PROCESS else BACK
         for i in range(N_TESTS):
             if TEST_RESIDUAL[i] != r or not ref.sd[i] > 0.0 or math.isnan(value):
                 continue
             z = abs(value - ref.mu[i]) / (ref.sd[i] * rougher(s, ref, r, 1))
-            if jumped > 0 and (back or z < BACK):
+            if jumped > 0 and (back or z < returned):
                 for j in range(N_TESTS):
                     if TEST_RESIDUAL[j] == r:
                         s.g[j, 0] = s.saved[j, 0]
@@ -78,7 +115,7 @@ def reject_spikes(s: MonitorState, ref: Reference) -> None:
                     s.llr = s.saved_llr
                 s.spikes[r] += 1
                 jumped = 0
-            if jumped == 0 and z > JUMP:
+            if jumped == 0 and z > (FAR_PROCESS if r == PROCESS else JUMP):
                 far = s.g[i, 0] < ref.h[i] and s.g[i, 1] < ref.h[i]
                 for j in range(N_TESTS):
                     if TEST_RESIDUAL[j] == r:
@@ -86,7 +123,10 @@ def reject_spikes(s: MonitorState, ref: Reference) -> None:
                         s.saved[j, 1] = s.g[j, 1]
                 if r == R1:
                     s.saved_llr = s.llr
-            calm = s.far_before[r] < BACK
+            calm = s.far_before[r] < returned
             s.far_before[r] = z
             break  # the first test of a residual judges the jump
-        s.jumped[r] = (ALONE if calm else FIRST) if far else 0
+        if jumped == ALONE and waits:
+            s.jumped[r] = UNANSWERED
+        else:
+            s.jumped[r] = (ALONE if calm else FIRST) if far else 0

@@ -1,0 +1,44 @@
+# Copyright 2026 DAMADICS FD maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""What a short record teaches of a pressure: its waves, and nothing of its noise."""
+
+import numpy as np
+import pytest
+from damadics_fd.core.scada.judging.pressure import PRESSURE, innovation, learn_pressure
+from damadics_fd.core.scada.learning import learn
+from damadics_fd.core.scada.monitor import ScadaMonitor
+
+from .driven import NOISE, SETTINGS, driven
+
+MINUTES = 270
+
+
+def learned(pressure: np.ndarray):
+    """Return the filter of a record."""
+    filt = np.zeros(1, PRESSURE)
+    learn_pressure(pressure, NOISE, filt[0])
+    return filt[0]
+
+
+@pytest.mark.parametrize('seed', range(5))
+def test_noise_has_nothing_to_predict_it_by(seed):
+    noise = np.random.default_rng(seed).normal(0.0, NOISE, MINUTES)
+    assert np.abs(learned(0.5 + noise).b).max() < 0.25
+
+
+@pytest.mark.parametrize('seed', range(5))
+def test_a_wave_is_predicted_of_a_short_record_too(seed):
+    rng = np.random.default_rng(seed)
+    t = np.arange(2 * MINUTES)
+    wave = 0.5 + 0.02 * np.sin(0.4 * t) + rng.normal(0.0, NOISE, t.size)
+    filt = learned(wave[:MINUTES])
+    past = [wave[k - 1 : k - 21 : -1] for k in range(MINUTES, t.size)]
+    error = [innovation(filt, p, wave[k]) for p, k in zip(past, t[MINUTES:], strict=True)]
+    assert np.std(error) < 2.0 * NOISE
+
+
+@pytest.mark.parametrize('seed', [168, 173])
+def test_a_pressure_learned_for_four_minutes_raises_nothing(seed):
+    reference = learn(driven(MINUTES, seed=1), SETTINGS)
+    trace = ScadaMonitor(SETTINGS, reference).run_samples(driven(2300, seed=seed))
+    assert not trace['alarm'].any()
