@@ -217,11 +217,13 @@ def test_judgements_out_survive_the_broker_and_say_when_we_are_gone(
     again = reader.joined + 2
     broker.start()
     assert wait_for(lambda: reader.joined >= again)
+    states = len(reader.of('site/fd/lv1/state'))
     os.kill(processes.pid('mqtt'), signal.SIGCONT)
     assert wait_for(lambda: len(reader.of('site/fd/lv1/event')) >= 6)
     texts = [json.loads(each)['text'] for each in reader.of('site/fd/lv1/event')]
     assert list(dict.fromkeys(texts)) == ['friction up', *(f'change {n}' for n in range(5))]
 
+    assert wait_for(lambda: len(reader.of('site/fd/lv1/state')) > states)  # after the events
     late = Program(broker.port, 'site/fd/#')
     assert wait_for(lambda: ('site/fd/lv1/state', True) in [(t, r) for t, _, r in late.got])
     processes.kill('mqtt')

@@ -11,7 +11,6 @@ from pathlib import Path
 import rclpy
 from rclpy.experimental import EventsExecutor
 from rclpy.signals import SignalHandlerOptions
-from rclpy.task import Future
 from rclpy.utilities import remove_ros_args
 
 from damadics_fd.bag.errors import BagError
@@ -20,10 +19,7 @@ from damadics_fd.bag.writing.blackbox import BlackBox
 from damadics_fd.bag.writing.spool import Spool
 from damadics_fd.nodes.recorder import Recorder
 from damadics_fd.ros.arguments import command_parser, suggestion
-from damadics_fd.ros.spin import spin_until
-
-QUIET = 0.02  # [s] without a message after which nothing is on its way any more
-LAST_WAIT = 0.12  # [s] at most, from the signal to the closing of the bag
+from damadics_fd.ros.spin import spin_until, take_what_is_on_its_way
 
 
 def _arguments(args: list[str]) -> argparse.Namespace:
@@ -130,12 +126,7 @@ def _spin(node: Recorder, spool: Spool, stop: list[int]) -> None:
     executor = EventsExecutor()
     executor.add_node(node)
     spin_until(lambda: bool(stop), executor, [node])
-    never: Future[None] = Future()
-    end = time.monotonic() + LAST_WAIT
-    received = -1
-    while received != spool.received and time.monotonic() < end:
-        received = spool.received
-        executor.spin_until_future_complete(never, QUIET)
+    take_what_is_on_its_way(executor, lambda: spool.received, lambda: node.newest)
 
 
 if __name__ == '__main__':

@@ -98,6 +98,7 @@ class Recorder(Node):
     def __init__(self, spool: Spool, topics: list[str]):
         super().__init__('recorder')
         self._spool = spool
+        self.newest = 0  # when the last message was published [ns]
         self._wanted = {self.resolve_topic_name(name) for name in topics}
         # blocks name their valves by number: without the list of these nobody can read them
         self._wanted |= {layout_topic(n) for n in self._wanted if n.endswith(f'/{BLOCK_TOPIC}')}
@@ -204,7 +205,8 @@ class Recorder(Node):
             if number is not None:
                 sequence.note(number)
             logged = now()
-            put((topic, data, logged, info['source_timestamp'] or logged))
+            self.newest = info['source_timestamp'] or logged
+            put((topic, data, logged, self.newest))
 
         receive.__signature__ = inspect.signature(lambda message, info: None)  # type: ignore[attr-defined]
         # no event of the middleware, not even the default ones: taking one can block for ever

@@ -26,6 +26,9 @@ WRONG = (NameValidationException, ParameterException)
 LOOK = 0.1  # s between two looks at whether to end
 FINISHING = 60.0  # s that subscribers may need for the last samples of a node that is done
 LEAVING = 5.0  # s that they may need where a signal ends the process
+QUIET = 0.02  # s without a message, three times in a row: nothing is on its way any more
+TIMES_QUIET = 3
+HELD_UP = 5.0  # s that messages of before the end may take where this process is held up
 LONG = 3600.0  # s; a call costs 30 bytes that rclpy never frees
 
 
@@ -76,6 +79,33 @@ def spin_until(done: Callable[[], bool], executor: EventsExecutor, nodes: Sequen
                 nodes[0].get_logger().error(f'internal error: {type(error).__name__}: {error}')
                 time.sleep(LOOK)
             nodes[0].destroy_timer(timer)
+
+
+def take_what_is_on_its_way(
+    executor: EventsExecutor, received: Callable[[], int], newest: Callable[[], int]
+) -> None:
+    """
+    Let subscribers take what was published until now.
+
+    A machine that is busy may hold this process up while messages wait for it: to hear nothing
+    counts only where it could listen, and what was published before is waited for.
+
+    :param executor: that has the subscribers.
+    :param received: returns how many messages came so far.
+    :param newest: returns when the last of them was published [ns, wall clock].
+    """
+    now, end = time.time_ns(), time.monotonic() + HELD_UP
+    never: Future[None] = Future()
+    quiet = 0
+    while quiet < TIMES_QUIET and time.monotonic() < end:
+        before, began = received(), time.monotonic()
+        executor.spin_until_future_complete(never, QUIET)
+        if received() != before:
+            quiet = 0
+            if newest() > now:  # of after: those of before have come
+                return
+        elif time.monotonic() - began < 2.0 * QUIET:
+            quiet += 1
 
 
 def let_subscribers_take(nodes: Sequence[Node], patience: float) -> bool:
