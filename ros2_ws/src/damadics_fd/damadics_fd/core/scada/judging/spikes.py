@@ -16,6 +16,7 @@ from damadics_fd.core.scada.state import N_RESIDUALS, N_TESTS, MonitorState, Ref
 JUMP = 6.0  # sigma from one sample to the next that may be a spike
 RETURNED = 0.3  # of a jump, by which the value may still be off when it has come back
 BACK = 4.0  # sigma within which it has come back
+ANSWER = 0.15  # of what the flow should be off by, that shows that something moved it
 FAR_PROCESS = 0.5  # its residual is 0 or 1
 # A jump that may be a spike; one out of calm, which raises no alarm by itself; one that the next
 # sample has not taken back, but the flow does not know of.
@@ -83,7 +84,8 @@ def unanswered(s: MonitorState, ref: Reference) -> bool:
     """
     if s.testable[R2] == 0 or math.isnan(s.residual[R2]) or abs(s.residual[R2]) < JUMP:
         return False
-    if max(off(s, F, 0), off(s, F, 1)) > ref.spike[F]:
+    answer = max(off(s, F, 0), off(s, F, 1))
+    if answer > max(ANSWER * abs(s.residual[R2]) * s.sq, ref.spike[F]):
         return False
     for i in range(X, P2 + 1):
         if ref.spike[i] > 0.0 and min(off(s, i, 0), off(s, i, 1)) > ref.spike[i]:
