@@ -28,6 +28,7 @@ FINISHING = 60.0  # s that subscribers may need for the last samples of a node t
 LEAVING = 5.0  # s that they may need where a signal ends the process
 QUIET = 0.02  # s without a message, three times in a row: nothing is on its way any more
 TIMES_QUIET = 3
+STREAM = 0.12  # s after which a stream that goes on is left
 HELD_UP = 5.0  # s that messages of before the end may take where this process is held up
 LONG = 3600.0  # s; a call costs 30 bytes that rclpy never frees
 
@@ -94,15 +95,16 @@ def take_what_is_on_its_way(
     :param received: returns how many messages came so far.
     :param newest: returns when the last of them was published [ns, wall clock].
     """
-    now, end = time.time_ns(), time.monotonic() + HELD_UP
+    now, start = time.time_ns(), time.monotonic()
     never: Future[None] = Future()
     quiet = 0
-    while quiet < TIMES_QUIET and time.monotonic() < end:
+    while quiet < TIMES_QUIET and time.monotonic() < start + HELD_UP:
         before, began = received(), time.monotonic()
         executor.spin_until_future_complete(never, QUIET)
         if received() != before:
             quiet = 0
-            if newest() > now:  # of after: those of before have come
+            # of after, so those of before have come; but a publisher's clock may be ahead
+            if newest() > now and time.monotonic() > start + STREAM:
                 return
         elif time.monotonic() - began < 2.0 * QUIET:
             quiet += 1

@@ -40,6 +40,7 @@ class Executor:
     [
         pytest.param([(0, 0, 3)] * 5 + [(178, 100, 1)], id='held up, then all at once'),
         pytest.param([(0, 0, 1), (0, 0, 1), (178, 100, 1)], id='late'),
+        pytest.param([(1, -5000, 1), (177, 100, 1)], id='a clock that is ahead'),
         pytest.param([(1, 400 - 10 * k, 1) for k in range(30)] + [(148, 100, 1)], id='far behind'),
     ],
 )

@@ -23,7 +23,7 @@ def learned(pressure: np.ndarray):
 @pytest.mark.parametrize('seed', range(5))
 def test_noise_has_nothing_to_predict_it_by(seed):
     noise = np.random.default_rng(seed).normal(0.0, NOISE, MINUTES)
-    assert np.abs(learned(0.5 + noise).b).max() < 0.25
+    assert np.count_nonzero(learned(0.5 + noise).b) <= 1
 
 
 @pytest.mark.parametrize('seed', range(5))
