@@ -81,7 +81,7 @@ def test_a_wrong_flow_and_a_wrong_position_after_it_raise_nothing(reference):
     rows = driven(400, seed=5, **STEPS)
     for at in range(85, 400, 60):
         rows[at, 6] -= 0.2
-        rows[at + 1, 2] += 0.2
+        rows[at + 1, 2] -= 0.2
     trace = ScadaMonitor(SETTINGS, reference).run_samples(rows)
     assert not trace['alarm'].any()
 

@@ -96,6 +96,7 @@ def decide(s: MonitorState, ref: Reference) -> None:
                     s.stretch[i, side, 0] = 0.0
                     s.stretch[i, side, 1] = 0.0
                     s.stretch[i, side, 2] = 0.0
+                g = min(g, s.g[i, side] + ONE_SAMPLE * ref.h[i])
                 cap = CAPS[0 if ref.k[i] > 1.0 else 1 if ref.k[i] >= QUICK else 2]
                 if s.jumped[r] >= ALONE and s.g[i, side] < ref.h[i]:
                     cap = ALMOST
