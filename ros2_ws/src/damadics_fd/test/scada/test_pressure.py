@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a short record teaches of a pressure: its waves, and nothing of its noise."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from damadics_fd.core.scada.judging.pressure import PRESSURE, innovation, learn_pressure
@@ -11,6 +13,7 @@ from damadics_fd.core.scada.monitor import ScadaMonitor
 from .driven import NOISE, SETTINGS, driven
 
 MINUTES = 270
+T, P1, P2 = 0, 3, 4
 
 
 def learned(pressure: np.ndarray):
@@ -41,4 +44,19 @@ def test_a_wave_is_predicted_of_a_short_record_too(seed):
 def test_a_pressure_learned_for_four_minutes_raises_nothing(seed):
     reference = learn(driven(MINUTES, seed=1), SETTINGS)
     trace = ScadaMonitor(SETTINGS, reference).run_samples(driven(2300, seed=seed))
+    assert not trace['alarm'].any()
+
+
+@pytest.mark.parametrize('missing', [5, 40])
+@pytest.mark.parametrize('seed', range(3))
+def test_a_wave_that_goes_on_after_a_gap_is_no_step(seed, missing):
+    rows = driven(900, seed)
+    wave = 0.05 * np.sin(0.4 * rows[:, T])
+    rows[:, P1] += wave
+    rows[:, P2] += wave
+    settings = replace(SETTINGS, learn_s=500.0)
+    reference = learn(rows[:530], settings)
+    trace = ScadaMonitor(settings, reference).run_samples(
+        np.delete(rows, np.s_[600 : 600 + missing], axis=0)
+    )
     assert not trace['alarm'].any()

@@ -53,8 +53,9 @@ def filter_pressures(s: MonitorState, ref: Reference, p1: float, p2: float) -> N
                 kept = predict_pressure(filt, s.past[i])
                 s.p_hat[i] = kept
             else:
+                second = far and s.doubtful[i] == DOUBTED
                 s.doubtful[i] = 0
-                if far:
+                if second:
                     s.doubtful[i] = BELIEVED
                     s.instead[i, :] = s.past[i]
                     push(s.instead[i], predict_pressure(filt, s.past[i]))
