@@ -21,6 +21,7 @@ def driven(
     jump: float = math.nan,
     air: float = 1.0,
     centre: float = 0.5,
+    every: int = 40,
     **faults: float,
 ) -> np.ndarray:
     """
@@ -28,7 +29,7 @@ def driven(
 
     :param at: from when on the faults act [s]; f7: [K], f17: share of P1.
     :param swing: how much the command moves.
-    :param jump: of the command every 40 s, which is then held between samples.
+    :param jump: of the command every so many seconds, which is then held between samples.
     :param air: in the chamber, over what pressure and volume say.
     :param centre: of the command's motion.
     """
@@ -43,7 +44,8 @@ def driven(
     )
     held = not math.isnan(jump)
     if held:
-        cv = cv - jump * (t // 40 % 2)
+        cv = cv - jump * (t // every % 2)
+    cv = np.clip(cv, 0.0, 1.0)
     p1, p2 = np.full(seconds, 3.5e6), np.full(seconds, 2.6e6)
     t1 = np.full(seconds, 43.0)
     p1[at:] *= 1.0 - faults.get('f17', 0.0)

@@ -3,11 +3,13 @@
 """What a flow law identified from a quarter of an hour claims to know."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from damadics_fd.core.scada.laws.fit_flow import fit_flow
 from damadics_fd.core.scada.laws.flow_law import characteristic, flow_doubt
+from damadics_fd.core.scada.laws.plausible import LearningError
 from damadics_fd.core.scada.learning import learn
 from damadics_fd.core.scada.monitor import ScadaMonitor
 from damadics_fd.core.scada.state import NOMINAL
@@ -15,6 +17,7 @@ from damadics_fd.core.scada.state import NOMINAL
 from .driven import SETTINGS, driven
 
 QUARTER = 900
+X, F = 2, 6  # places among the signals
 AT, SLOPE = 0.65, -5.0
 SIGMAS = 3.0  # of the law's doubt that are no evidence
 
@@ -83,3 +86,28 @@ def test_noise_below_the_end_of_a_meter_is_not_the_flow(seed):
     for place in (0.3, 0.4):
         below = -6.0 * (place - 0.45) - characteristic(law, place)
         assert below < SIGMAS * flow_doubt(law, place, float(law['size0']))
+
+
+def closing(seconds: int, seed: int) -> np.ndarray:
+    """Return rows of a valve that is closed for five minutes of ten."""
+    rows = driven(seconds, seed, centre=0.7, swing=0.2, jump=-0.7, every=300)
+    rows[:, X:] = np.clip(rows[:, X:], 0.0, 1.0)
+    return rows
+
+
+@pytest.mark.parametrize('seed', range(3))
+def test_a_closed_valve_is_no_evidence_and_a_leak_is(seed):
+    """X' ends at 1 and F' at 0, their noise does not."""
+    known = learn(closing(1200, seed), replace(SETTINGS, learn_s=1200.0))
+    rows = closing(3600, seed + 10)
+    monitor = ScadaMonitor(SETTINGS, known)
+    assert not monitor.run_samples(rows)['alarm'].any()
+    rows[3000:, F] += 0.06
+    monitor.reset()
+    trace = monitor.run_samples(rows)
+    assert 3000.0 < trace['t'][trace['alarm']][0] < 3005.0
+
+
+def test_a_stem_that_is_never_between_its_stops_for_long_is_refused():
+    with pytest.raises(LearningError, match='ends of its stroke'):
+        learn(driven(600, seed=1, centre=0.85, swing=1.2), replace(SETTINGS, learn_s=600.0))

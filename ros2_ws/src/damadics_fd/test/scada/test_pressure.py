@@ -13,7 +13,7 @@ from damadics_fd.core.scada.monitor import ScadaMonitor
 from .driven import NOISE, SETTINGS, driven
 
 MINUTES = 270
-T, P1, P2 = 0, 3, 4
+T, X, P1, P2 = 0, 2, 3, 4
 
 
 def learned(pressure: np.ndarray):
@@ -60,3 +60,14 @@ def test_a_wave_that_goes_on_after_a_gap_is_no_step(seed, missing):
         np.delete(rows, np.s_[600 : 600 + missing], axis=0)
     )
     assert not trace['alarm'].any()
+
+
+@pytest.mark.parametrize('second', [-0.2, -0.1])
+def test_two_pressures_that_are_off_otherwise_do_not_throw_the_model(second):
+    """A stem that is thrown to its stop loses air, and never answers as before."""
+    rows = driven(900, seed=3)
+    monitor = ScadaMonitor(SETTINGS, learn(rows[:300], SETTINGS))
+    monitor.run_samples(rows[:600])
+    rows[600:602, P1] += 0.2, second
+    monitor.run_samples(rows[600:604])
+    assert abs(float(monitor.state.xm[0]) - rows[603, X]) < 0.01

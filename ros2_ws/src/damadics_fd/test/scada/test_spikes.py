@@ -3,10 +3,13 @@
 """Wrong samples: of CV they move the model and not the stem, of others one residual."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from damadics_fd.core.scada.judging.residuals import process_residual
+from damadics_fd.core.scada.judging.spikes import wary
+from damadics_fd.core.scada.laws.actuator import nominal_flow
 from damadics_fd.core.scada.learning import learn
 from damadics_fd.core.scada.monitor import ScadaMonitor
 from damadics_fd.core.scada.state import MONITOR
@@ -86,6 +89,40 @@ def test_a_wrong_flow_and_a_wrong_position_after_it_raise_nothing(reference):
     assert not trace['alarm'].any()
 
 
+def with_wrong_samples(rows: np.ndarray, until: int) -> np.ndarray:
+    """Let a record show that single samples of it are wrong now and then."""
+    rows[61:until:15, 6] = np.clip(rows[61:until:15, 6] - 0.2, 0.0, 1.0)
+    return rows
+
+
+@pytest.mark.parametrize('signal', [2, 3, 4, 6], ids=['X', 'P1', 'P2', 'F'])
+@pytest.mark.parametrize('off', [-0.2, 0.2])
+def test_two_wrong_samples_raise_nothing_where_the_record_has_shown_single_ones(
+    reference, signal, off
+):
+    rows = with_wrong_samples(driven(400, seed=5, **STEPS), 160)
+    for at in range(175, 400, 30):
+        rows[at : at + 2, signal] = np.clip(rows[at : at + 2, signal] + off, 0.0, 1.0)
+    trace = ScadaMonitor(SETTINGS, reference).run_samples(rows)
+    assert not trace['alarm'].any()
+
+
+@pytest.mark.parametrize('fault', [{'f13': 0.25}, {'f17': 0.1}, {'f19': 0.25}])
+def test_there_a_fault_is_found_with_the_third_sample(reference, fault):
+    rows = with_wrong_samples(driven(300, 6, 155, **fault, **STEPS), 150)
+    trace = ScadaMonitor(SETTINGS, reference).run_samples(rows)
+    assert 155.0 < trace['t'][trace['alarm']][0] <= 157.0
+
+
+def test_wrong_samples_of_long_ago_do_not_count(reference):
+    monitor = ScadaMonitor(SETTINGS, reference)
+    monitor.run_samples(with_wrong_samples(driven(200, seed=6, **STEPS), 150))
+    assert wary(monitor.state)
+    later = driven(9000, seed=6, **STEPS)[200:]
+    monitor.run_samples(later)
+    assert not wary(monitor.state)
+
+
 @pytest.mark.parametrize('fault', [{'f13': 0.25}, {'f17': 0.1}], ids=['X', 'P1'])
 def test_what_the_flow_answers_is_believed_with_the_second_sample(reference, fault):
     trace = ScadaMonitor(SETTINGS, reference).run_samples(driven(300, 6, 155, **fault, **STEPS))
@@ -100,6 +137,28 @@ def test_what_stays_away_is_believed_without_the_flow_with_the_third(reference, 
     rows[155:, signal] += off
     trace = ScadaMonitor(SETTINGS, reference).run_samples(rows)
     assert 155.0 < trace['t'][trace['alarm']][0] <= 157.0
+
+
+@pytest.mark.parametrize('shown', [True, False], ids=['by the flow', 'by X alone'])
+def test_one_sample_of_x_is_believed_where_the_flow_shows_it_too(shown):
+    known = learn(driven(3600, seed=1, **STEPS), replace(SETTINGS, learn_s=3600.0))
+    rows = driven(300, seed=6, **STEPS)
+    act, row = SETTINGS.record()['act'][0], rows[175]
+    before = nominal_flow(act, row[2], *row[3:6])
+    row[2] -= 0.04
+    if shown:
+        row[6] += nominal_flow(act, row[2], *row[3:6]) - before
+    trace = ScadaMonitor(SETTINGS, known).run_samples(rows)
+    assert trace['alarm'][175] == trace['alarm'].any() == shown
+
+
+def test_a_small_f13_that_a_quick_positioner_takes_back_is_found_with_the_second_sample(reference):
+    """X shows it for one sample, then the flow alone."""
+    rows = driven(300, seed=6, **STEPS)
+    rows[155, 2] += 0.1
+    rows[156:, 6] += 0.08
+    trace = ScadaMonitor(SETTINGS, reference).run_samples(rows)
+    assert trace['t'][trace['alarm']][0] == 156.0
 
 
 @pytest.mark.parametrize('lasts', [2, 40])

@@ -27,7 +27,12 @@ from damadics_fd.core.scada.laws.clean import (
     worthwhile,
 )
 from damadics_fd.core.scada.laws.fit_stem import Piece, StemFit, fit_stem
-from damadics_fd.core.scada.laws.plausible import LearningError, check_stem, possible
+from damadics_fd.core.scada.laws.plausible import (
+    LearningError,
+    check_between_stops,
+    check_stem,
+    possible,
+)
 from damadics_fd.core.scada.laws.robust import Floats, effective, huber_weights, loss_of
 from damadics_fd.core.scada.prediction import Prediction, predicted, residuals_of
 from damadics_fd.core.scada.samples import CV, PRESSURE_1, PRESSURE_2, T, X
@@ -132,6 +137,8 @@ def _learned(
     if ref.stem_kind == LAW or ref.flow_kind == LAW:
         wandering = True
     values, rough = residuals_of(clean, settings, reference, window)
+    if ref.stem_kind == NOMINAL:
+        check_between_stops(values[:, R1])
     ref.rough[:] = usual_roughness(rough)
     sigma = np.full(N_RESIDUALS, np.nan)
     if ref.stem_kind == LAW:

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from damadics_fd.core.jit import jit
 from damadics_fd.core.record import Floats
+from damadics_fd.core.scada.judging.cusum import R1
 from damadics_fd.core.scada.judging.predict import predict
 from damadics_fd.core.scada.judging.residuals import residuals
 from damadics_fd.core.scada.settings import ScadaSettings
-from damadics_fd.core.scada.state import MONITOR, N_RESIDUALS, N_ROUGH, N_WEIGHTS
+from damadics_fd.core.scada.state import MONITOR, N_RESIDUALS, N_ROUGH, N_WEIGHTS, NOMINAL
 
 
 @dataclass(frozen=True)
@@ -53,6 +54,8 @@ def _predict_record(
         models[i, 5] = 1.0 if s.masked else 0.0
         for k in range(N_RESIDUALS):
             models[i, 6 + k] = s.residual[k] if s.testable[k] > 0 else math.nan
+        if reference[0].stem_kind == NOMINAL and s.t < s.t_stop:
+            models[i, 6 + R1] = math.nan  # nothing but what is allowed for at a stop
         rough[i] = s.rough
 
 

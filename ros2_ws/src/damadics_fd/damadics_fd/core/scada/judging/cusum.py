@@ -43,7 +43,7 @@ class Cusum:
 # fault-free days that no result is reported for.
 # Where the inputs wander, as on a real plant, so do the residuals: wider limits, no slowest tests.
 TESTS = (
-    Cusum(R1, 4.0, 1, NO_CLIP, 2.5, 2.7),
+    Cusum(R1, 4.0, 1, NO_CLIP, 1.65, 2.7),
     Cusum(R1, 1.5, 1, NO_CLIP, 3.4, 3.4),
     Cusum(R1, 0.5, 5, 4.0, 1.8, 2.3),
     Cusum(R1, 0.15, 30, 4.0, 1.6, 4.5),

@@ -10,7 +10,7 @@ from damadics_fd.core.jit import jit
 from damadics_fd.core.scada.judging.cusum import FRICTION_TEST, QUICK, R1, R2, TEST_RESIDUAL, TESTS
 from damadics_fd.core.scada.judging.leverage import more_unsure
 from damadics_fd.core.scada.judging.roughness import rougher
-from damadics_fd.core.scada.judging.spikes import ALONE, reject_spikes
+from damadics_fd.core.scada.judging.spikes import ALONE, CONFIRMED, count_wrong, reject_spikes
 from damadics_fd.core.scada.laws.stem_law import shrink
 from damadics_fd.core.scada.state import LAW, N_RESIDUALS, N_TESTS, MonitorState, Reference
 
@@ -53,6 +53,7 @@ def silence(s: MonitorState) -> None:
 def decide(s: MonitorState, ref: Reference) -> None:
     """Feed every test; the first statistic to reach its limit raises the alarm."""
     s.ratio = 0.0
+    count_wrong(s, ref)
     if s.t < s.t_test:
         silence(s)
         s.ratio = 1.0 if s.stood else 0.0
@@ -84,7 +85,8 @@ def decide(s: MonitorState, ref: Reference) -> None:
                 k += ref.se[i] * s.air_doubt if r == R1 else 0.0
                 unsure = ref.se[i] * (s.lever[r] - 1.0)
             s.beyond[i] = 1 if abs(z) > k + unsure else 0
-            most = k + unsure + ONE_SAMPLE * ref.h[i]
+            brings = CAPS[0] if s.jumped[r] == CONFIRMED else ONE_SAMPLE
+            most = k + unsure + brings * ref.h[i]
             z = min(max(z, -most), most)
             for side in range(2):
                 g = s.g[i, side] + (z if side == 0 else -z) - k
@@ -96,7 +98,7 @@ def decide(s: MonitorState, ref: Reference) -> None:
                     s.stretch[i, side, 0] = 0.0
                     s.stretch[i, side, 1] = 0.0
                     s.stretch[i, side, 2] = 0.0
-                g = min(g, s.g[i, side] + ONE_SAMPLE * ref.h[i])
+                g = min(g, s.g[i, side] + brings * ref.h[i])
                 cap = CAPS[0 if ref.k[i] > 1.0 else 1 if ref.k[i] >= QUICK else 2]
                 if s.jumped[r] >= ALONE and s.g[i, side] < ref.h[i]:
                     cap = ALMOST

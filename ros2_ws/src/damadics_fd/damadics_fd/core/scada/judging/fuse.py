@@ -14,9 +14,22 @@ from damadics_fd.core.scada.judging.pressure import (
     predict_pressure,
     push,
 )
+from damadics_fd.core.scada.judging.spikes import wary
 from damadics_fd.core.scada.state import LAW, MonitorState, Reference
 
-DOUBTED, BELIEVED = 1, 2  # a pressure far from its prediction: the first, a second in a row
+BELIEVED = -1  # a pressure far from its prediction; before that how often it was doubted in a row
+MOST_DOUBTS = 3  # samples after which it is believed wherever it is
+ALIKE = 0.5  # of a jump, by which the next may differ and speak for the same
+FIRST = 2  # place of P1 among the last samples
+
+
+@jit
+def convinces(s: MonitorState, i: int, doubts: int, predicted: float) -> bool:
+    """Tell whether a pressure far from its prediction is true, after so many that were doubted."""
+    before = s.last[1, FIRST + i]
+    same = abs(s.last[0, FIRST + i] - before) < ALIKE * abs(before - predicted)
+    enough = doubts > 1 if wary(s) else doubts > 0
+    return doubts >= MOST_DOUBTS or (same and enough)
 
 
 @jit
@@ -24,7 +37,8 @@ def filter_pressures(s: MonitorState, ref: Reference, p1: float, p2: float) -> N
     """
     Fuse each pressure with its prediction; do not believe a single value far from it.
 
-    A second one is believed; where the third has come back, neither was true.
+    A second one that is where the first was is believed, in a record that shows wrong samples a
+    third; where the next has come back, none of them was true.
     """
     s.innovation[:] = math.nan
     law = ref.stem_kind == LAW
@@ -48,17 +62,18 @@ def filter_pressures(s: MonitorState, ref: Reference, p1: float, p2: float) -> N
             elif s.doubtful[i] == BELIEVED:  # a step: it goes on as before, from where it is now
                 s.past[i, :] = s.instead[i] + (s.past[i, 0] - s.instead[i, 0])
             far = is_far(filt, s.past[i], measured)
-            if far and s.doubtful[i] != DOUBTED and s.steady > TAPS:
-                s.doubtful[i] = DOUBTED
-                kept = predict_pressure(filt, s.past[i])
+            doubts = max(s.doubtful[i], 0)
+            predicted = predict_pressure(filt, s.past[i])
+            if far and s.steady > TAPS and not convinces(s, i, doubts, predicted):
+                s.doubtful[i] = doubts + 1
+                kept = predicted
                 s.p_hat[i] = kept
             else:
-                second = far and s.doubtful[i] == DOUBTED
                 s.doubtful[i] = 0
-                if second:
+                if far and doubts > 0:
                     s.doubtful[i] = BELIEVED
                     s.instead[i, :] = s.past[i]
-                    push(s.instead[i], predict_pressure(filt, s.past[i]))
+                    push(s.instead[i], predicted)
                 s.p_hat[i] = fuse_pressure(filt, s.past[i], measured)
             if s.steady > TAPS:
                 s.innovation[i] = innovation(filt, s.past[i], measured)

@@ -29,6 +29,7 @@ SLOW_METER_S = 5.0  # a record in which the flow hardly moves does not tell the 
 METER_LAGS = 3.0  # after a gap, until a flow meter shows the flow
 COPIES = 2  # rows in a row that may be copies
 AWAY_PERIODS = 1.5  # that a wrong CV may stay away
+AT_END = 3.0  # standard deviations of the noise from the end of a range
 BLIND = 2  # samples without a pressure that the stated stem is carried over
 
 
@@ -242,7 +243,23 @@ def predict_flow(
     s.sq = cfg.sigma * math.sqrt(1.0 + fx * fx + fp * fp * c)
     # the mask follows the model: one on the noisy f itself would select f's errors
     s.f_model = nominal_flow(cfg.act, s.xm[0], p1, p2, t1)
-    s.masked = s.f > cfg.flow_high and flow > cfg.flow_high and s.f_model > cfg.model_high
+    saturated = s.f > cfg.flow_high and flow > cfg.flow_high and s.f_model > cfg.model_high
+    s.masked = saturated or shut(s, cfg, x, t1, flow)
+
+
+@jit
+def shut(s: MonitorState, cfg: ScadaConfig, x: float, t1: float, flow: float) -> bool:
+    """
+    Tell whether X' and F' are at their other ends, where both say no more than this.
+
+    A flow that noise of X' does not explain there is a leak, and is judged.
+    """
+    noise = AT_END * cfg.sigma
+    if max(x, s.xm[0]) < 1.0 - noise:
+        return False
+    least = nominal_flow(cfg.act, 1.0 - 2.0 * noise, s.p_hat[0], s.p_hat[1], t1)
+    no_more: bool = flow < least + noise
+    return no_more
 
 
 @jit

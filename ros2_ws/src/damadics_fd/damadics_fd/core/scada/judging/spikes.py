@@ -3,7 +3,9 @@
 """
 Wrong samples: what one of them brings is taken back when the next has come back.
 
-Of X, P1 and P2 two in a row are waited for as well, while the flow tells that nothing has moved.
+Of X, P1 and P2 two in a row are waited for as well, while the flow tells that nothing has moved,
+and of any signal in a record that has shown several wrong samples lately. An X that the flow
+confirms is not wrong at all.
 """
 
 import math
@@ -11,7 +13,7 @@ import math
 from damadics_fd.core.jit import jit
 from damadics_fd.core.scada.judging.cusum import PROCESS, R1, R2, TEST_RESIDUAL
 from damadics_fd.core.scada.judging.roughness import rougher
-from damadics_fd.core.scada.state import N_RESIDUALS, N_TESTS, MonitorState, Reference
+from damadics_fd.core.scada.state import LAW, N_RESIDUALS, N_TESTS, MonitorState, Reference
 
 JUMP = 6.0  # sigma from one sample to the next that may be a spike
 RETURNED = 0.3  # of a jump, by which the value may still be off when it has come back
@@ -21,8 +23,12 @@ FAR_PROCESS = 0.5  # its residual is 0 or 1
 # A jump that may be a spike; one out of calm, which raises no alarm by itself; one that the next
 # sample has not taken back, but the flow does not know of.
 FIRST, ALONE, UNANSWERED = 1, 2, 3
+CONFIRMED = -1  # a jump of X that the flow shows, too
 CV, X, P2, F = 0, 1, 3, 4  # places among the last samples of CV, X, P1, P2, F
 CV_SPIKE = 0.02  # of the stroke: smaller ones move the model of the stem by too little
+SEVERAL = 2.0  # wrong samples lately, beyond which two in a row are to be expected
+LATELY = 3600.0  # samples
+AGREES = 3.0  # sigma within which the flow is where X says
 
 
 @jit
@@ -66,6 +72,51 @@ def taken_back(s: MonitorState, ref: Reference) -> bool:
 
 
 @jit
+def wary(s: MonitorState) -> bool:
+    """Tell whether the record has shown so many wrong samples that two in a row may be wrong."""
+    many: bool = s.wrong > SEVERAL
+    return many
+
+
+@jit
+def count_wrong(s: MonitorState, ref: Reference) -> None:
+    """Count the wrong samples that the record has shown lately."""
+    s.wrong *= 1.0 - 1.0 / LATELY
+    for i in range(F + 1):
+        if ref.spike[i] > 0.0 and came_back(s, i, max(ref.spike[i], CV_SPIKE), 1):
+            s.wrong += 1.0
+
+
+@jit
+def confirmed(s: MonitorState, ref: Reference) -> bool:
+    """
+    Tell whether the flow is where X says, and far from where the model of the stem says.
+
+    X is not wrong then, nor the flow: the stem is elsewhere. A wrong CV, which moves the model
+    alone, would look like it.
+    """
+    if ref.stem_kind == LAW or ref.flow_kind == LAW or s.testable[R2] == 0:
+        return False
+    turn = abs(s.last[0, CV] - 2.0 * s.last[1, CV] + s.last[2, CV])
+    if wary(s) or turn > ref.spike[CV]:
+        return False
+    there: bool = abs(s.residual[R2]) < AGREES and abs(s.f - s.f_model) > JUMP * s.sq
+    return there
+
+
+@jit
+def left_the_flow(s: MonitorState, ref: Reference) -> bool:
+    """
+    Tell whether X was another for one sample, with which the flow could not agree.
+
+    If it does not agree with the next either, a positioner has followed its own transmitter.
+    """
+    if ref.flow_kind == LAW or wary(s) or not ref.spike[X] > 0.0:
+        return False
+    return came_back(s, X, ref.spike[X], 1)
+
+
+@jit
 def off(s: MonitorState, i: int, ago: int) -> float:
     """Return how far from its place two samples ago, and from the way it went, a signal was."""
     place = s.last[2, i]
@@ -97,7 +148,8 @@ def unanswered(s: MonitorState, ref: Reference) -> bool:
 def reject_spikes(s: MonitorState, ref: Reference) -> None:
     """Take back what a wrong sample brought, or two, when the signal has come back."""
     back = taken_back(s, ref)
-    waits = unanswered(s, ref)
+    waits = wary(s) or unanswered(s, ref)
+    jump = BACK if wary(s) else JUMP
     for r in range(N_RESIDUALS):
         value = s.residual[r]
         jumped = s.jumped[r]
@@ -108,6 +160,8 @@ def reject_spikes(s: MonitorState, ref: Reference) -> None:
             if TEST_RESIDUAL[i] != r or not ref.sd[i] > 0.0 or math.isnan(value):
                 continue
             z = abs(value - ref.mu[i]) / (ref.sd[i] * rougher(s, ref, r, 1))
+            if jumped > 0 and z > JUMP and r == R2 and left_the_flow(s, ref):
+                jumped = 0
             if jumped > 0 and (back or z < returned):
                 for j in range(N_TESTS):
                     if TEST_RESIDUAL[j] == r:
@@ -117,7 +171,7 @@ def reject_spikes(s: MonitorState, ref: Reference) -> None:
                     s.llr = s.saved_llr
                 s.spikes[r] += 1
                 jumped = 0
-            if jumped == 0 and z > (FAR_PROCESS if r == PROCESS else JUMP):
+            if jumped <= 0 and z > (FAR_PROCESS if r == PROCESS else jump):
                 far = s.g[i, 0] < ref.h[i] and s.g[i, 1] < ref.h[i]
                 for j in range(N_TESTS):
                     if TEST_RESIDUAL[j] == r:
@@ -130,5 +184,7 @@ def reject_spikes(s: MonitorState, ref: Reference) -> None:
             break  # the first test of a residual judges the jump
         if jumped == ALONE and waits:
             s.jumped[r] = UNANSWERED
+        elif far and r == R1 and confirmed(s, ref):
+            s.jumped[r] = CONFIRMED
         else:
             s.jumped[r] = (ALONE if calm else FIRST) if far else 0
