@@ -109,5 +109,5 @@ def test_a_closed_valve_is_no_evidence_and_a_leak_is(seed):
 
 
 def test_a_stem_that_is_never_between_its_stops_for_long_is_refused():
-    with pytest.raises(LearningError, match='ends of its stroke'):
+    with pytest.raises(LearningError, match='end of its stroke'):
         learn(driven(600, seed=1, centre=0.85, swing=1.2), replace(SETTINGS, learn_s=600.0))

@@ -48,6 +48,18 @@ def test_two_wrong_samples_of_cv_raise_nothing(reference, off):
     assert not trace['alarm'].any()
 
 
+@pytest.mark.parametrize(('lasts', 'alarm'), [(30, False), (140, True)])
+def test_r1_waits_for_a_model_that_a_wrong_cv_has_thrown_but_not_for_ever(lasts, alarm):
+    known = learn(driven(270, seed=1, **STEPS), SETTINGS)
+    rows = driven(300, seed=5, **STEPS)
+    rows[:, 6] = np.nan
+    rows[155, CV] += 0.2
+    rows[156 : 156 + lasts, 2] -= 0.03
+    trace = ScadaMonitor(SETTINGS, known).run_samples(rows)
+    assert trace['alarm'].any() == alarm
+    assert not trace['alarm'][:206].any()
+
+
 def test_a_fault_between_wrong_samples_is_found(reference):
     rows = driven(300, 6, 155, f13=0.25, **STEPS)
     rows[WRONG, CV] += 0.2

@@ -29,7 +29,7 @@ from damadics_fd.core.scada.laws.clean import (
 from damadics_fd.core.scada.laws.fit_stem import Piece, StemFit, fit_stem
 from damadics_fd.core.scada.laws.plausible import (
     LearningError,
-    check_between_stops,
+    check_residual,
     check_stem,
     possible,
 )
@@ -138,7 +138,7 @@ def _learned(
         wandering = True
     values, rough = residuals_of(clean, settings, reference, window)
     if ref.stem_kind == NOMINAL:
-        check_between_stops(values[:, R1])
+        check_residual(values[:, R1])
     ref.rough[:] = usual_roughness(rough)
     sigma = np.full(N_RESIDUALS, np.nan)
     if ref.stem_kind == LAW:

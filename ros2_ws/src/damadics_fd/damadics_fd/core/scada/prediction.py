@@ -16,6 +16,8 @@ from damadics_fd.core.scada.judging.residuals import residuals
 from damadics_fd.core.scada.settings import ScadaSettings
 from damadics_fd.core.scada.state import MONITOR, N_RESIDUALS, N_ROUGH, N_WEIGHTS, NOMINAL
 
+BETWEEN = 100  # samples with the stem between its stops that tell how quiet it is
+
 
 @dataclass(frozen=True)
 class Prediction:
@@ -54,8 +56,7 @@ def _predict_record(
         models[i, 5] = 1.0 if s.masked else 0.0
         for k in range(N_RESIDUALS):
             models[i, 6 + k] = s.residual[k] if s.testable[k] > 0 else math.nan
-        if reference[0].stem_kind == NOMINAL and s.t < s.t_stop:
-            models[i, 6 + R1] = math.nan  # nothing but what is allowed for at a stop
+        models[i, 6 + N_RESIDUALS] = 1.0 if s.t < s.t_stop else 0.0
         rough[i] = s.rough
 
 
@@ -67,7 +68,7 @@ def predicted(
     trial['hold'] = hold
     trial['x_sd'] = trial['f_sd'] = 1.0
     phi = np.empty((len(samples), N_WEIGHTS))
-    models = np.empty((len(samples), 6 + N_RESIDUALS))
+    models = np.empty((len(samples), 7 + N_RESIDUALS))
     rough = np.empty((len(samples), N_ROUGH, 2))
     _predict_record(np.zeros(1, MONITOR), settings.record(), trial, samples, phi, models, rough)
     phi, models = phi[window], models[window]
@@ -84,8 +85,12 @@ def residuals_of(
     :return: residuals, NaN where not testable, shape (n, 6); roughness as it is followed.
     """
     phi = np.empty((len(samples), N_WEIGHTS))
-    models = np.empty((len(samples), 6 + N_RESIDUALS))
+    models = np.empty((len(samples), 7 + N_RESIDUALS))
     rough = np.empty((len(samples), N_ROUGH, 2))
     state, record = np.zeros(1, MONITOR), settings.record()
     _predict_record(state, record, reference, samples, phi, models, rough)
-    return models[window][:, 6:], rough[window]
+    values, stopped = models[window][:, 6:-1], models[window][:, -1] > 0.0
+    between = np.isfinite(values[:, R1]) & ~stopped
+    if reference[0]['stem_kind'] == NOMINAL and between.sum() >= BETWEEN:
+        values[stopped, R1] = np.nan  # there it is what is allowed for at a stop that hides it
+    return values, rough[window]

@@ -148,6 +148,7 @@ class MonitorState(Record):
     jumped: Annotated[Ints, N_RESIDUALS]
     far_before: Annotated[Floats, N_RESIDUALS]  # how far the last one was, sigma
     spikes: Annotated[Ints, N_RESIDUALS]
+    thrown: int  # samples for which r1 may still wait for the model after a wrong CV
     wrong: float  # single wrong samples of any signal lately
     process: int  # which pressures were far from their level which way, as bits
     doubtful: Annotated[Ints, 2]  # whether the last P1, P2 was far and not, or yet, believed

@@ -5,6 +5,7 @@
 import math
 
 from damadics_fd.core.jit import jit
+from damadics_fd.core.scada.judging.cusum import R1
 from damadics_fd.core.scada.judging.decide import silence
 from damadics_fd.core.scada.judging.pressure import TAPS
 from damadics_fd.core.scada.judging.roughness import break_off
@@ -16,6 +17,8 @@ from damadics_fd.core.scada.state import LAW, MonitorState, Reference
 FORGET_S = 300.0
 SETTLING_PERIODS = 10.0
 MISSED = 1.5  # periods: one sample of CV at least is missing, which a law follows at once
+MOST_THROWN = 60  # samples that r1 waits for a model that a wrong CV has thrown
+ARRIVED = 4.0  # sigma within which it is back
 GAP_PERIODS = 5.0  # sample periods without a sample that are no gap yet
 
 
@@ -66,6 +69,18 @@ def bridge(s: MonitorState, ref: Reference, t: float) -> None:
         wait = ref.period + ref.stem_law.dead_s + 4.0 * ref.stem_law.lag_s
     s.t_stem = max(s.t_stem, t + wait)
     break_off(s)
+
+
+@jit
+def wait_for_the_model(s: MonitorState, ref: Reference) -> None:
+    """Make no test of r1 until a model that a wrong CV has thrown is back at the stem."""
+    if s.thrown == 0:
+        return
+    s.thrown -= 1
+    if s.testable[R1] > 0 and abs(s.residual[R1]) < ARRIVED * ref.s1:
+        s.thrown = 0
+    elif s.thrown > 0:
+        s.testable[R1] = 0
 
 
 @jit

@@ -8,6 +8,7 @@ from damadics_fd.core.jit import jit
 from damadics_fd.core.scada.judging.fuse import filter_pressures
 from damadics_fd.core.scada.judging.gap import (
     GAP_PERIODS,
+    MOST_THROWN,
     SETTLING_PERIODS,
     begin_again,
     bridge,
@@ -121,6 +122,7 @@ def predict(
         s.t_flow = max(s.t_flow, t + METER_LAGS * max(ref.flow_law.lag_s, ref.period))
     if cv_came_back(s, ref):
         bridge(s, ref, t)
+        s.thrown = 0 if ref.stem_kind == LAW else MOST_THROWN
     elif cv_jumped(s, ref):
         s.t_stem = max(s.t_stem, t + AWAY_PERIODS * ref.period)
     if not repeated(s) and not stands_still(s, ref):

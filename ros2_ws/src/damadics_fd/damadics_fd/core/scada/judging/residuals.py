@@ -6,6 +6,7 @@ import math
 
 from damadics_fd.core.jit import jit
 from damadics_fd.core.scada.judging.cusum import P1, P2, PROCESS, QUICK, R1, R2, T1, TEST_RESIDUAL
+from damadics_fd.core.scada.judging.gap import wait_for_the_model
 from damadics_fd.core.scada.judging.leverage import lever
 from damadics_fd.core.scada.judging.predict import repeated, stands_still
 from damadics_fd.core.scada.judging.roughness import follow_roughness
@@ -89,6 +90,7 @@ def residuals(
     s.residual[R1] = shrink(raw, doubt)
     s.residual[R2] = flow_residual(s, ref, x, flow)
     s.testable[R1] = 1 if s.t >= s.t_stem else 0
+    wait_for_the_model(s, ref)
     still = stands_still(s, ref)
     if still or (repeated(s) and ref.stem_kind == LAW):
         s.testable[R1] = 0

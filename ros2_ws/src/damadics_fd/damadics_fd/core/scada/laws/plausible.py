@@ -16,7 +16,6 @@ UNEXPLAINED = 0.45  # share of the deviation of X that a law leaves which does n
 REACH = 0.3  # by which the reach of the stem may differ from that of CV
 OFFSET = 0.1
 SIGMAS = 4.0
-BETWEEN = 100  # samples with the stem between its stops
 UNLIKE = 'this does not look like a valve that works'
 FLOW_GAIN = 0.1
 ABSURD = 1e3  # times its range: no signal of a valve
@@ -47,18 +46,17 @@ def possible(samples: Floats) -> Floats:
     return np.where(absurd, np.nan, samples)
 
 
-def check_between_stops(r1: Floats) -> None:
+def check_residual(r1: Floats) -> None:
     """
-    Refuse a record in which the stem is hardly ever away from the ends of its stroke.
+    Refuse a record that shows nothing of the stem but its stops.
 
-    :param r1: stem residual of the stated actuator, NaN at a stop and for a minute after it.
-    :raises LearningError: saying how little is left.
+    :param r1: stem residual, 0 where what is allowed for at a stop hides it, NaN: not testable.
+    :raises LearningError: where it does everywhere.
     """
-    between = int(np.isfinite(r1).sum())
-    if between < BETWEEN:
+    if not np.any(r1[np.isfinite(r1)] != 0.0):
         raise LearningError(
-            f'the stem was away from the ends of its stroke for more than a minute in {between} '
-            f'of {r1.size} samples only: record {BETWEEN} or more in which it is in between'
+            'the stem was at an end of its stroke, or had been within a minute, all the time: '
+            'record some minutes in which it is in between'
         )
 
 
