@@ -102,6 +102,9 @@ def test_a_closed_valve_is_no_evidence_and_a_leak_is(seed):
     rows = closing(3600, seed + 10)
     monitor = ScadaMonitor(SETTINGS, known)
     assert not monitor.run_samples(rows)['alarm'].any()
+    monitor.reset()
+    monitor.run_samples(rows[:550])
+    assert monitor.state.masked
     rows[3000:, F] += 0.06
     monitor.reset()
     trace = monitor.run_samples(rows)
