@@ -63,17 +63,19 @@ def client_of(url: str, token: str) -> Client:
     return client
 
 
-async def value_of(client, path: str, status=ua.StatusCodes.Good):
+async def shows(client, path: str, value=None, status=ua.StatusCodes.Good) -> bool:
+    """Wait until a variable shows a value with a status: each valve is written for itself."""
     own = await client.get_namespace_index('urn:damadics:fd')
-    for _ in range(200):
+    found = None
+    for _ in range(int(PATIENCE / 0.1)):
         try:
             found = await client.get_node(ua.NodeId(path, own)).read_data_value(False)
-            if found.StatusCode.value == status:
-                return found.Value.Value
-        except ua.UaError:
-            pass
+            if found.StatusCode.value == status and found.Value.Value == value:
+                return True
+        except ua.UaError as missing:
+            found = missing
         await asyncio.sleep(0.1)
-    raise AssertionError(f'{path} is not {status}')
+    raise AssertionError(f'{path} is not {value} ({status:#x}), but {found}')
 
 
 def test_a_fault_is_a_condition_that_an_operator_acknowledges(served):
@@ -81,7 +83,7 @@ def test_a_fault_is_a_condition_that_an_operator_acknowledges(served):
 
     async def watch():
         async with client_of(url, OPERATOR) as client, client_of(url, VIEWER) as viewer:
-            assert await value_of(client, 'lv101.DeviceHealth') == 0
+            assert await shows(client, 'lv101.DeviceHealth', 0)
             padim, di = [await client.get_namespace_index(uri) for uri in (PADIM, DI)]
             own = await client.get_namespace_index('urn:damadics:fd')
             path = ['0:Objects', f'{own}:Valves', f'{own}:LV101', f'{di}:DeviceHealth']
@@ -96,9 +98,9 @@ def test_a_fault_is_a_condition_that_an_operator_acknowledges(served):
             assert raised is not None, log.read_text()
             assert raised.Message.Text == 'friction up' and raised.Severity == 700
             assert raised.Retain and getattr(raised, 'AckedState/Id') is False
-            assert await value_of(client, 'lv101.DeviceHealth') == 3, 'off spec'
-            assert await value_of(client, 'lv101.Ratio') == 2.0
-            assert await value_of(client, 'lv101.Cause') == 'friction_up'
+            assert await shows(client, 'lv101.DeviceHealth', 3), 'off spec'
+            assert await shows(client, 'lv101.Ratio', 2.0)
+            assert await shows(client, 'lv101.Cause', 'friction_up')
 
             condition = client.get_node(ua.NodeId('lv101.Alarm', own))
             method = ua.NodeId(ua.ObjectIds.AcknowledgeableConditionType_Acknowledge)
@@ -122,8 +124,9 @@ def test_a_fault_is_a_condition_that_an_operator_acknowledges(served):
             with pytest.raises(ua.UaError):
                 await health.write_value(ua.Variant(0, ua.VariantType.Int32))
             detectors.silence()
-            await value_of(client, 'lv101.Residual', ua.StatusCodes.BadNoCommunication)
-            assert await value_of(client, 'lv102.DeviceHealth') == 2, 'check function, not normal'
+            lost = ua.StatusCodes.BadNoCommunication
+            assert await shows(client, 'lv101.Residual', status=lost)
+            assert await shows(client, 'lv102.DeviceHealth', 2), 'check function, not normal'
 
     asyncio.run(watch())
 
