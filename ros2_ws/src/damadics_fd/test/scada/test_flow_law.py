@@ -14,6 +14,7 @@ from damadics_fd.core.scada.learning import learn
 from damadics_fd.core.scada.monitor import ScadaMonitor
 from damadics_fd.core.scada.state import NOMINAL
 
+from .driven import NOISE as STEM_NOISE
 from .driven import SETTINGS, driven
 
 QUARTER = 900
@@ -114,3 +115,10 @@ def test_a_closed_valve_is_no_evidence_and_a_leak_is(seed):
 def test_a_stem_that_is_never_between_its_stops_for_long_is_refused():
     with pytest.raises(LearningError, match='end of its stroke'):
         learn(driven(600, seed=1, centre=0.85, swing=1.2), replace(SETTINGS, learn_s=600.0))
+
+
+@pytest.mark.parametrize('seed', [1, 2, 3])
+def test_a_stem_is_not_learned_to_be_quieter_for_the_time_at_its_stop(seed):
+    batches = driven(1800, seed=seed, centre=0.9, swing=0.3, jump=-0.4, every=150)
+    known = learn(batches, replace(SETTINGS, learn_s=1800.0))
+    assert known['s1'][0] == pytest.approx(STEM_NOISE, rel=0.1)

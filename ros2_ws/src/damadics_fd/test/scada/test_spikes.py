@@ -126,6 +126,19 @@ def test_there_a_fault_is_found_with_the_third_sample(reference, fault):
     assert 155.0 < trace['t'][trace['alarm']][0] <= 157.0
 
 
+@pytest.mark.parametrize('shown', [True, False], ids=['wrong samples before', 'none before'])
+def test_there_what_a_slightly_wrong_flow_brought_is_taken_back_as_well(reference, shown):
+    right = driven(200, seed=6, **STEPS)
+    if shown:
+        right = with_wrong_samples(right, 150)
+    monitor = ScadaMonitor(SETTINGS, reference)
+    r2 = monitor.run_samples(right)['r2'][175]
+    rows = right.copy()
+    rows[175, 6] += (5.0 - r2) * monitor.state.sq
+    after = [ScadaMonitor(SETTINGS, reference).run_samples(r)['ratio'][176] for r in (rows, right)]
+    assert (after[0] < after[1] + 0.01) == shown
+
+
 def test_wrong_samples_of_long_ago_do_not_count(reference):
     monitor = ScadaMonitor(SETTINGS, reference)
     monitor.run_samples(with_wrong_samples(driven(200, seed=6, **STEPS), 150))
