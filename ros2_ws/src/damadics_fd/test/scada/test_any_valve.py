@@ -3,6 +3,7 @@
 """Mode scada on valves that are not the benchmark's, by a generator of its own."""
 
 import json
+import math
 
 import numpy as np
 import pytest
@@ -62,6 +63,29 @@ def test_a_foreign_valve_is_learned_and_its_faults_are_found(name):
             isolation = found.isolate()
             assert isolation is not None
             assert fault in isolation.candidates
+
+
+def behind(flow, lag):
+    """Return a flow as a slow meter shows it."""
+    shown = flow.copy()
+    for k in range(1, len(flow)):
+        shown[k] = shown[k - 1] + (1.0 - math.exp(-1.0 / lag)) * (flow[k] - shown[k - 1])
+    return shown
+
+
+def test_a_wrong_position_leaves_no_trace_in_what_a_slow_flow_meter_should_show():
+    kind = KINDS['Kv 480, linear']
+    day, quiet = record(kind, load(HOURS, 1), 1), record(kind, load(HOURS, 2), 2)
+    for columns in (day, quiet):
+        columns['flow'] = behind(columns['flow'], 4.0)
+    found = identify([FaultFree('day', day)], SHEET)
+    reference = Reference.read(found.learned, 'learned')
+    assert reference['flow_law']['lag_s'] == pytest.approx(4.0, abs=1.5)
+    quiet['x1'][500::500] = np.clip(quiet['x1'][500::500] - 0.3, 0.0, 1.0)
+    monitor = ScadaMonitor(scada_settings(SHEET.replace(**found.settings)), reference)
+    trace = monitor.run(quiet)
+    assert not trace['alarm'].any()
+    assert trace['ratio'][501::500].max() < 0.4  # of the limit, with the sample after it
 
 
 def test_a_slow_drift_is_followed_and_told():

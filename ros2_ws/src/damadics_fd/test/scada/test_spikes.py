@@ -31,6 +31,16 @@ def reference(request):
     return learn(rows, SETTINGS)
 
 
+@pytest.mark.parametrize('off', [-0.2, 0.2])
+def test_a_wrong_sample_of_cv_is_not_learned_from(off):
+    rows = driven(270, seed=1, **STEPS)
+    right = learn(rows, SETTINGS)
+    rows[WRONG, CV] = np.clip(rows[WRONG, CV] + off, 0.0, 1.0)
+    wrong = learn(rows, SETTINGS)
+    for name in ('cv_jump', 's1', 'h'):
+        assert wrong[name] == pytest.approx(right[name], rel=0.05)
+
+
 @pytest.mark.parametrize('off', [-0.2, 0.1, 0.2])
 def test_a_wrong_sample_of_cv_raises_nothing(reference, off):
     rows = driven(300, seed=5, **STEPS)

@@ -15,6 +15,7 @@ N_TESTS = len(TESTS)
 N_WEIGHTS = 11
 BASIC_WEIGHTS = 3  # constant, gain, CV slope; the others only where they earn their place
 HISTORY_LENGTH = 1536
+METER = 3  # last samples with a flow that the meter lags behind, the latest first
 N_RESIDUALS = 6
 N_ROUGH = 5  # of them, whose noise is followed: all but the process
 FIRST_TRIAL, TRIALS = 2, 6  # models that run beside the two after a start
@@ -105,7 +106,7 @@ class MonitorState(Record):
     t_test: float  # no test before
     t_stem: float  # no test of r1 before
     t_flow: float  # no test of r2 before
-    t_lagged: float  # when the flow that the meter lags behind was known last
+    t_lagged: Annotated[Floats, METER]  # when the flow that the meter lags behind was known
     blind: int  # samples in a row without a pressure
     filled: int  # pressure samples since the last restart
     past: Annotated[Floats, 2, TAPS]
@@ -126,8 +127,8 @@ class MonitorState(Record):
     last: Annotated[Floats, 4, 5]  # CV, X, P1, P2, F of this sample and the three before
     repeats: int  # samples in a row that are the one before
     size: float
-    f_lagged: float
-    f_slow: float  # the same behind a meter as slow as meters are
+    f_lagged: Annotated[Floats, METER]
+    f_slow: Annotated[Floats, METER]  # the same behind a meter as slow as meters are
     top_flow: float  # largest so far, and how often: a meter at its end shows it again and again
     top_count: int
     drift: Annotated[Floats, 2]  # of stem (share of stroke) and flow (log) since learning

@@ -99,8 +99,8 @@ def restart(
     if ref.stem_kind == LAW:
         s.track.lagged[:] = (x - ref.stem_law.offset) / ref.stem_law.gain
         s.track.held[:] = s.track.lagged[0]
-    s.f_lagged = math.nan
-    s.f_slow = math.nan
+    s.f_lagged[:] = math.nan
+    s.f_slow[:] = math.nan
     s.last[:] = math.nan
     more = air_over_rest(s.stem[0], cfg.act) if s.filled > 0 else math.exp(ref.air)
     start_stem(s.stem[0], cfg.act, t)

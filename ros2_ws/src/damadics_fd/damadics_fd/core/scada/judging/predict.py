@@ -15,6 +15,7 @@ from damadics_fd.core.scada.judging.gap import (
     missing,
     restart,
 )
+from damadics_fd.core.scada.judging.meter import METER_LAGS, follow_meter
 from damadics_fd.core.scada.judging.pressure import predict_pressure
 from damadics_fd.core.scada.judging.spikes import cv_came_back, cv_jumped
 from damadics_fd.core.scada.laws.actuator import nominal_flow
@@ -26,8 +27,6 @@ from damadics_fd.core.scada.state import HISTORY_LENGTH, LAW, MonitorState, Refe
 
 OTHER_PERIOD = 1.6  # factor between two sample periods that are not the same
 STRANGE = 20  # samples in a row
-SLOW_METER_S = 5.0  # a record in which the flow hardly moves does not tell the meter's lag
-METER_LAGS = 3.0  # after a gap, until a flow meter shows the flow
 COPIES = 2  # rows in a row that may be copies
 AWAY_PERIODS = 1.5  # that a wrong CV may stay away
 AT_END = 3.0  # standard deviations of the noise from the end of a range
@@ -102,7 +101,7 @@ def predict(
     if s.samples == 0:
         s.t_first = t
         s.t_test = t + cfg.t_on_s
-        s.t_lagged = t
+        s.t_lagged[:] = t
         s.level[:] = math.nan
         restart(s, cfg, ref, t, cv, x, p1, p2)
     elif t - s.t > max(cfg.gap_s, GAP_PERIODS * ref.period):
@@ -289,22 +288,9 @@ def predict_by_law(
     if math.isnan(x) or math.isnan(s.size) or math.isinf(s.size):
         return
     f = math.exp(characteristic(law, x) + s.size)
-    dt = t - s.t_lagged
-    if dt > GAP_PERIODS * ref.period:  # unknown meanwhile: the meter may show what was before
-        s.f_lagged = math.nan
-        s.f_slow = math.nan
-        s.t_flow = max(s.t_flow, t + METER_LAGS * law.lag_s)
-    if math.isnan(s.f_lagged) or not law.lag_s > 0.0:
-        s.f_lagged = f
-    else:
-        s.f_lagged += (1.0 - math.exp(-dt / law.lag_s)) * (f - s.f_lagged)
-    if math.isnan(s.f_slow):
-        s.f_slow = f
-    else:
-        s.f_slow += (1.0 - math.exp(-dt / max(law.lag_s, SLOW_METER_S))) * (f - s.f_slow)
-    s.t_lagged = t
+    follow_meter(s, ref, t, f)
     if math.isnan(flow):
         return
-    s.f = s.f_lagged
+    s.f = s.f_lagged[0]
     s.sq = math.sqrt(law.noise * law.noise + s.f * s.f * law.spread * law.spread)
     s.masked = False

@@ -168,8 +168,8 @@ def flow_residual(s: MonitorState, ref: Reference, x: float, flow: float) -> flo
     band = math.exp(DOUBT * math.sqrt(doubt * doubt + hours * hours) + drifted)
     scale = law.range if law.range > 0.0 else ref.flow_max
     floor = 0.005 * scale
-    low = min(s.f, s.f_slow) * drift / band - floor
-    high = max(s.f, s.f_slow) * drift * band + floor
+    low = min(s.f, s.f_slow[0]) * drift / band - floor
+    high = max(s.f, s.f_slow[0]) * drift * band + floor
     top = law.range
     if s.top_count >= AGAIN and s.top_flow >= END * ref.flow_max:
         top = min(top, s.top_flow) if top > 0.0 else s.top_flow

@@ -13,6 +13,7 @@ import math
 from damadics_fd.core.jit import jit
 from damadics_fd.core.scada.judging.cusum import PROCESS, R1, R2, TEST_RESIDUAL
 from damadics_fd.core.scada.judging.roughness import rougher
+from damadics_fd.core.scada.laws.clean import CV_SPIKE
 from damadics_fd.core.scada.state import LAW, N_RESIDUALS, N_TESTS, MonitorState, Reference
 
 JUMP = 6.0  # sigma from one sample to the next that may be a spike
@@ -25,7 +26,7 @@ FAR_PROCESS = 0.5  # its residual is 0 or 1
 FIRST, ALONE, UNANSWERED = 1, 2, 3
 CONFIRMED = -1  # a jump of X that the flow shows, too
 CV, X, P2, F = 0, 1, 3, 4  # places among the last samples of CV, X, P1, P2, F
-CV_SPIKE = 0.02  # of the stroke: smaller ones move the model of the stem by too little
+MOST_AWAY = 2  # samples in a row that are taken back
 SEVERAL = 2.0  # wrong samples lately, beyond which two in a row are to be expected
 LATELY = 3600.0  # samples
 AGREES = 3.0  # sigma within which the flow is where X says
@@ -62,12 +63,28 @@ def cv_jumped(s: MonitorState, ref: Reference) -> bool:
 
 
 @jit
+def away(s: MonitorState, ref: Reference, i: int) -> int:
+    """Return for how many samples, two at most, a signal was another before it came back."""
+    for length in range(1, MOST_AWAY + 1):
+        if ref.spike[i] > 0.0 and came_back(s, i, ref.spike[i], length):
+            return length
+    return 0
+
+
+@jit
+def wrong_before(s: MonitorState, ref: Reference) -> int:
+    """Return for how many samples, two at most, X, P1 or P2 was another before it came back."""
+    longest = 0
+    for i in range(X, P2 + 1):
+        longest = max(longest, away(s, ref, i))
+    return longest
+
+
+@jit
 def taken_back(s: MonitorState, ref: Reference) -> bool:
     """Tell whether any signal jumped one sample ago, or two, and has come back with this one."""
-    for i in range(X, F + 1):
-        least = ref.spike[i]
-        if least > 0.0 and (came_back(s, i, least, 1) or came_back(s, i, least, 2)):
-            return True
+    if wrong_before(s, ref) > 0 or away(s, ref, F) > 0:
+        return True
     return cv_came_back(s, ref)
 
 

@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damadics_fd.core.scada.laws.robust import Floats, spread_of
+from damadics_fd.core.scada.samples import CV, FLOW
 
 ISOLATED = 8.0  # sigma of the change from sample to sample
 ALIKE, MOST = 0.2, 0.9  # share of the period, share of the samples
 LEAST_PART = 20  # samples between two gaps
-MEASURED = (2, 3, 4, 5, 6)  # columns that a transmitter sends; CV is what was commanded
+CV_SPIKE = 0.02  # of the stroke: smaller ones of CV move a model of the stem by too little
 
 
 def spike_sizes(samples: Floats) -> Floats:
@@ -29,22 +30,25 @@ def despiked(samples: Floats) -> Floats:
     """
     Return the record with every single-sample spike replaced by its neighbours' mean.
 
+    A command that was another for one sample only may have been true: a record loses nothing by
+    it, while a wrong one throws the model of the stem for many.
+
     :param samples: rows t, CV, X', P1', P2', T1', F'.
     """
     out = samples.copy()
     if len(samples) < 5:
         return out
-    for column in MEASURED:
+    for column in range(CV, FLOW + 1):
         v = samples[:, column]
         if not np.isfinite(v).any():
             continue
         middle = 0.5 * (v[:-2] + v[2:])
         off = v[1:-1] - middle
         steady = np.abs(v[2:] - v[:-2])
-        sigma = spread_of(off)
-        if not sigma > 0.0:
+        least = max(ISOLATED * spread_of(off), CV_SPIKE if column == CV else 0.0)
+        if not least > 0.0:
             continue
-        bad = (np.abs(off) > ISOLATED * sigma) & (steady < 0.5 * np.abs(off))
+        bad = (np.abs(off) > least) & (steady < 0.5 * np.abs(off))
         out[1:-1, column] = np.where(bad, middle, v[1:-1])
     return out
 
