@@ -136,3 +136,15 @@ def wandering(n: int, seed: int) -> np.ndarray:
         level = 0.998 * level + 0.0065 * kick
         cv[k] = 0.5 + level
     return np.clip(cv, 0.0, 1.0)
+
+
+def restless(n: int, seed: int, spread: float = 0.08, memory: float = 3.0) -> np.ndarray:
+    """Return a command that goes elsewhere within seconds, as that of a fast loop does."""
+    rng = np.random.default_rng(seed)
+    keep = math.exp(-1.0 / memory)
+    cv = np.empty(n)
+    level = 0.0
+    for k, kick in enumerate(rng.normal(size=n).tolist()):
+        level = keep * level + math.sqrt(1.0 - keep * keep) * kick
+        cv[k] = 0.5 + spread * level
+    return np.clip(cv, 0.0, 1.0)

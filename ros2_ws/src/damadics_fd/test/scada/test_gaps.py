@@ -3,13 +3,14 @@
 """Mode scada over gaps: what is worth anything after them, and what is not."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from damadics_fd.core.scada.learning import learn
 from damadics_fd.core.scada.monitor import ScadaMonitor
 
-from .driven import SETTINGS, driven, following
+from .driven import SETTINGS, driven, following, late, restless
 
 T, CV, X, P1, P2, T1, F = range(7)
 AT = 60  # s
@@ -148,3 +149,24 @@ def test_a_command_that_was_missed_for_one_sample_raises_nothing(followed):
         rows[i + 3, X] += 0.05
     trace = ScadaMonitor(SETTINGS, followed).run_samples(np.delete(rows, range(AT, AT + 24, 6), 0))
     assert not trace['alarm'].any()
+
+
+def with_rows_missing(rows: np.ndarray, seed: int, share: float = 0.2) -> np.ndarray:
+    """Return a record as a historian gives it that leaves out rows now and then."""
+    kept = np.random.default_rng([seed, 9]).random(len(rows)) > share
+    kept[0] = True
+    return rows[kept]
+
+
+@pytest.mark.parametrize('lag', [0.35, 1.2])
+@pytest.mark.parametrize('seed', [1, 2, 3])
+def test_where_every_fifth_row_is_missing_a_restless_stem_is_judged_all_the_same(seed, lag):
+    learned = late(restless(900, seed), seed, lag=lag)
+    known = learn(with_rows_missing(learned, seed), replace(SETTINGS, learn_s=900.0))
+    rows = late(restless(1800, seed + 20), seed + 20, lag=lag)
+    monitor = ScadaMonitor(SETTINGS, known)
+    assert not monitor.run_samples(with_rows_missing(rows, seed + 20))['alarm'].any()
+    rows[900:, 2] = rows[900, 2]
+    monitor.reset()
+    trace = monitor.run_samples(with_rows_missing(rows, seed + 20))
+    assert 900.0 < trace['t'][trace['alarm']][0] < 960.0

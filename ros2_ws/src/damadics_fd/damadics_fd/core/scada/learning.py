@@ -110,7 +110,7 @@ def _learned(
     reference = np.zeros(1, REFERENCE)
     ref = reference[0]
     ref.regular = is_regular(samples[:, T])
-    ref.spike[:] = spike_sizes(samples)
+    ref.spike[:] = spike_sizes(clean)
     ref.longest_repeat = longest_repeat(samples[window])
     ref.n, ref.period, ref.seconds = n, period_of(samples[:, T]), np.ptp(part[:, T])
     with np.errstate(all='ignore'):

@@ -9,7 +9,7 @@ from damadics_fd.core.scada.judging.cusum import R1
 from damadics_fd.core.scada.judging.decide import silence
 from damadics_fd.core.scada.judging.pressure import TAPS
 from damadics_fd.core.scada.judging.roughness import break_off
-from damadics_fd.core.scada.laws.stem_law import start_track
+from damadics_fd.core.scada.laws.stem_law import doubt, start_track
 from damadics_fd.core.scada.model import air_over_rest, copy_stem, start_stem
 from damadics_fd.core.scada.settings import ScadaConfig
 from damadics_fd.core.scada.state import LAW, MonitorState, Reference
@@ -17,6 +17,9 @@ from damadics_fd.core.scada.state import LAW, MonitorState, Reference
 FORGET_S = 300.0
 SETTLING_PERIODS = 10.0
 MISSED = 1.5  # periods: one sample of CV at least is missing, which a law follows at once
+FORGOTTEN, FADING = 4.0, 1.0  # lags
+FEW_MISSED = 3.5  # periods: one sample or two are missing
+CV, USUAL = 0, 0.4  # of a spike of CV: three standard deviations of its change
 MOST_THROWN = 60  # samples that r1 waits for a model that a wrong CV has thrown
 ARRIVED = 4.0  # sigma within which it is back
 GAP_PERIODS = 5.0  # sample periods without a sample that are no gap yet
@@ -62,13 +65,37 @@ def missing(ref: Reference, periods: float) -> bool:
 
 
 @jit
-def bridge(s: MonitorState, ref: Reference, t: float) -> None:
-    """Make no test of r1 for a while after t: which way CV went since the last sample is open."""
+def bridge(s: MonitorState, ref: Reference, t: float, lags: float = FORGOTTEN) -> None:
+    """
+    Make no test of r1 for a while after t: which way CV went since the last sample is open.
+
+    :param lags: of an identified stem, until what it did is forgotten.
+    """
     wait = SETTLING_PERIODS * ref.period
     if ref.stem_kind == LAW:
-        wait = ref.period + ref.stem_law.dead_s + 4.0 * ref.stem_law.lag_s
+        wait = ref.period + ref.stem_law.dead_s + lags * ref.stem_law.lag_s
     s.t_stem = max(s.t_stem, t + wait)
     break_off(s)
+
+
+@jit
+def miss(s: MonitorState, ref: Reference, cv: float, dt: float) -> None:
+    """
+    Allow for what CV may have been while samples are missing before this one.
+
+    Where one or two are missing and it answers at once, the law is doubted by what CV usually
+    does meanwhile, and r1 waits for what it may have done once; else r1 waits for all to fade.
+
+    :param cv: of this sample, to which the law has been brought.
+    :param dt: s since the sample before.
+    """
+    law = ref.stem_law
+    at_once = law.dead_s < ref.period and law.stick == 0.0
+    if ref.stem_kind == LAW and at_once and dt < FEW_MISSED * ref.period:
+        doubt(s.track, law, USUAL * ref.spike[CV] + abs(cv - s.cv[0]), dt)
+        bridge(s, ref, s.t, FADING)
+    else:
+        bridge(s, ref, s.t)
 
 
 @jit

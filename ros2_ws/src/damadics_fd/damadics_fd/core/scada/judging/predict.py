@@ -12,6 +12,7 @@ from damadics_fd.core.scada.judging.gap import (
     SETTLING_PERIODS,
     begin_again,
     bridge,
+    miss,
     missing,
     restart,
 )
@@ -107,8 +108,7 @@ def predict(
     elif t - s.t > max(cfg.gap_s, GAP_PERIODS * ref.period):
         begin_again(s, cfg, ref, t)
         restart(s, cfg, ref, t, cv, x, p1, p2)
-    elif ref.regular and missing(ref, (t - s.t) / max(cfg.period_s, ref.period)):
-        bridge(s, ref, t)
+    gap = ref.regular and missing(ref, (t - s.t) / max(cfg.period_s, ref.period))
     watch_period(s, cfg, ref, t)
     stood_still = stands_still(s, ref)
     entry = s.history[s.samples % HISTORY_LENGTH]
@@ -126,6 +126,8 @@ def predict(
         s.t_stem = max(s.t_stem, t + AWAY_PERIODS * ref.period)
     if not repeated(s) and not stands_still(s, ref):
         advance_track(s.track, ref.stem_law, t, cv)
+    if gap and s.filled > 0:
+        miss(s, ref, cv, t - t0)
     law = ref.stem_kind == LAW
     if not law:
         copy_stem(s.stem[0], entry.stem)

@@ -71,9 +71,17 @@ def period_of(t: Floats) -> float:
 
 
 def is_regular(t: Floats) -> bool:
-    """Tell whether samples come at one period; a historian may leave some out."""
-    between = np.diff(t)
-    return bool(len(t) > 1 and np.mean(np.abs(between / np.median(between) - 1.0) < ALIKE) > MOST)
+    """
+    Tell whether samples come at one period; a historian may leave some out.
+
+    >>> is_regular(np.array([0, 1, 2, 5, 6, 7, 9.0])), is_regular(np.array([0, 1, 2, 3.5, 4, 6.4]))
+    (True, False)
+    """
+    if len(t) < 2:
+        return False
+    periods = np.diff(t) / period_of(t)
+    whole = np.maximum(np.round(periods), 1.0)
+    return bool(np.mean(np.abs(periods - whole) < ALIKE) > MOST)
 
 
 def worthwhile(t: Floats, gap: float) -> NDArray[np.bool_]:

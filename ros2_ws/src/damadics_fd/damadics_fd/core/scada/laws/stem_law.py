@@ -172,6 +172,22 @@ def follow(s: StemTrack, law: StemLaw, cv: float, dt: float) -> None:
 
 
 @jit
+def doubt(s: StemTrack, law: StemLaw, cv: float, dt: float) -> None:
+    """
+    Spread the copies to both sides of the law; they come back to it with its lag.
+
+    :param cv: by how much CV may have been another during dt.
+    """
+    share = 1.0 - math.exp(-dt / law.lag_s) if law.lag_s > 0.0 else 1.0
+    fastest = QUICKER * max(law.rise, law.fall) * dt
+    away = min(share * cv, fastest)
+    s.lagged[1] = s.lagged.min() - away
+    s.lagged[2] = s.lagged.max() + away
+    s.held[1] = s.held.min() - away
+    s.held[2] = s.held.max() + away
+
+
+@jit
 def position(s: StemTrack, law: StemLaw, k: int) -> float:
     """Return the position of the law (0), its slow copy (1) or its quick one (2), 0..1."""
     x: float = law.offset + law.gain * s.held[k]
