@@ -11,7 +11,8 @@ from damadics_fd.core.scada.laws.robust import Floats, spread_of
 from damadics_fd.core.scada.samples import CV, FLOW
 
 ISOLATED = 8.0  # sigma of the change from sample to sample
-ALIKE, MOST = 0.2, 0.9  # share of the period, share of the samples
+ALIKE = 0.2  # share of the period
+MOST, MANY = 0.9, 0.7  # of the samples a whole number of periods apart, one period apart
 LEAST_PART = 20  # samples between two gaps
 CV_SPIKE = 0.02  # of the stroke: smaller ones of CV move a model of the stem by too little
 
@@ -74,14 +75,19 @@ def is_regular(t: Floats) -> bool:
     """
     Tell whether samples come at one period; a historian may leave some out.
 
-    >>> is_regular(np.array([0, 1, 2, 5, 6, 7, 9.0])), is_regular(np.array([0, 1, 2, 3.5, 4, 6.4]))
-    (True, False)
+    One that keeps what changes alone leaves out most in quiet hours: that is no period.
+
+    >>> is_regular(np.array([0, 1, 2, 3, 4, 6, 7, 8.0]))
+    True
+    >>> is_regular(np.array([0, 1, 2, 4, 7, 8.0]))
+    False
     """
     if len(t) < 2:
         return False
     periods = np.diff(t) / period_of(t)
-    whole = np.maximum(np.round(periods), 1.0)
-    return bool(np.mean(np.abs(periods - whole) < ALIKE) > MOST)
+    left_out = np.maximum(np.round(periods), 1.0) - 1.0
+    at_it = np.abs(periods - left_out - 1.0) < ALIKE
+    return bool(at_it.mean() > MOST and (at_it & (left_out == 0.0)).mean() > MANY)
 
 
 def worthwhile(t: Floats, gap: float) -> NDArray[np.bool_]:
