@@ -3,6 +3,8 @@
 """Live, offline and at any speed: the same flags and residuals, bit for bit."""
 
 import json
+import os
+import signal
 import time
 from pathlib import Path
 
@@ -18,8 +20,12 @@ from damadics_fd.core.decision.alarm import RAISED
 from damadics_fd.core.monitor import run
 from damadics_fd.core.sample import SIGNALS
 from damadics_fd.core.settings import Settings
+from damadics_fd.ros import qos
+from damadics_msgs.msg import Measurement
 from damadics_plant import simulate
 from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.task import Future
 
 pytestmark = pytest.mark.ros
 GOLDEN = Path(__file__).parents[2] / 'bags'
@@ -107,6 +113,27 @@ def test_live_replay_publishes_signature_and_events_as_the_nodes_do(tmp_path):
         assert set(tags.tolist()) == {'LV-101'}, topic
 
 
+def test_live_replay_leaves_when_a_subscriber_that_was_held_up_has_all(tmp_path):
+    columns = excerpt('dablib_spring', 66.0, 74.0)
+    source = tmp_path / 'source.mcap'
+    write_columns(source, columns)
+    domain = free_domain()
+    with Processes(tmp_path / 'logs', surroundings(domain)) as processes:
+        processes.start('damadics_fd', 'recorder', ['--out', str(tmp_path / 'bag')])
+        wait_for_subscribers(domain, processes, {'measurement': 1})
+        processes.start('damadics_fd', 'replay', [str(source), '--live', '--rate', '2'])
+        wait_for_a_sample(domain)
+        os.kill(processes.pid('recorder'), signal.SIGSTOP)
+        time.sleep(10.0)
+        assert not processes.ended('replay')
+        os.kill(processes.pid('recorder'), signal.SIGCONT)
+        wait_for_end(processes, 'replay')
+        assert processes.exit_code('replay') == 0
+        processes.end('recorder')
+    recorded = read_columns(tmp_path / 'bag', '/measurement')
+    assert recorded['stamp'].tolist() == columns['stamp'].tolist()
+
+
 def test_live_replay_leaves_the_clock_of_its_node_alone():
     context = Context()
     rclpy.init(context=context, domain_id=free_domain())
@@ -177,6 +204,20 @@ def wait_for_subscribers(
         assert time.monotonic() < deadline
         processes.check()
         time.sleep(0.1)
+    node.destroy_node()
+    context.try_shutdown()
+
+
+def wait_for_a_sample(domain: int, patience: float = 120.0) -> None:
+    context = Context()
+    rclpy.init(context=context, domain_id=domain)
+    node = rclpy.create_node('watcher', context=context)
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    came: Future = Future()
+    node.create_subscription(Measurement, 'measurement', came.set_result, qos.SAMPLES)
+    executor.spin_until_future_complete(came, patience)
+    assert came.done()
     node.destroy_node()
     context.try_shutdown()
 

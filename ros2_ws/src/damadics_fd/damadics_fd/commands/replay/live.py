@@ -19,13 +19,13 @@ from damadics_msgs.msg import (
     Measurement,
 )
 from rclpy.context import Context
-from rclpy.duration import Duration
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
 from tqdm import tqdm
 
 from damadics_fd.bag.arrays import Columns
+from damadics_fd.bag.checking.inspection import LOSSY
 from damadics_fd.bag.recording import Recording
 from damadics_fd.causes import explain, load_causes
 from damadics_fd.commands.replay.bags import Plan, joined
@@ -45,6 +45,7 @@ from damadics_fd.ros.conversions import (
 )
 from damadics_fd.ros.entities import Entities
 from damadics_fd.ros.raw import Encoder, EstimateEncoder
+from damadics_fd.ros.spin import FINISHING, let_subscribers_take
 
 CLOCK_PERIOD = 0.01  # [s] of wall time between two messages on /clock
 HEARTBEAT = 10**9  # [ns] of scenario time between two flags without change
@@ -192,10 +193,11 @@ class Player(Node):
                 self._judgements.take(Sample(stamp, *signals))
             yield row
 
-    def finish(self) -> None:
-        """Let subscribers take the last sample, then go."""
-        self._measurement.wait_for_all_acked(Duration(seconds=2.0))
+    def finish(self) -> bool:
+        """Let subscribers take what was published, then go; tell whether they have all."""
+        taken = let_subscribers_take([self], FINISHING)
         self.destroy_node()
+        return taken
 
     def _wait_for(self, stamp: int) -> None:
         """Wait until a sample is due, showing the time on /clock."""
@@ -233,10 +235,11 @@ def publish(
     :param rate: speed in multiples of real time.
     :param inputs_only: publish the samples alone, for estimator and detector nodes that run.
     :param ros_args: arguments of ROS 2, from `--ros-args` on.
-    :return: exit code, 0 also after SIGINT and SIGTERM.
+    :return: exit code, 0 also after SIGINT and SIGTERM, 3 where a subscriber did not take all.
     :raises BagError: where a recording cannot be read.
     """
     rclpy.init(args=list(ros_args))
+    code = 0
     try:
         for recording in recordings:
             player = Player(rate, None if inputs_only else plan.monitor(), frame_id(recording))
@@ -249,14 +252,15 @@ def publish(
                         bar.update()
                         if not rclpy.ok():
                             return 0
-            player.finish()
+            if not player.finish():
+                code = LOSSY
             if columns is None:
                 _warn(f'{recording.name}: has no measurement: the topic is empty')
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     finally:
         rclpy.try_shutdown()
-    return 0
+    return code
 
 
 def _warn(text: str) -> None:
