@@ -67,7 +67,8 @@ def write_slot(path: Path | str, kind: str, content: Saved, *, both: bool = Fals
     :param path: without slot and suffix; its folder is made where it is missing.
     :param kind: the format that the file names.
     :param content: what `read_slots` gives back; finite numbers only.
-    :param both: write the other slot too, so that damage of one of them loses nothing.
+    :param both: write the other slot too, so that damage of one of them loses nothing; the first
+        is in place before the disk is waited for, so that a kill in between loses nothing either.
     :return: the file written first.
     :raises OSError: where it cannot be written; what was there stays.
     :raises ValueError: where a number is not finite.
@@ -78,17 +79,24 @@ def write_slot(path: Path | str, kind: str, content: Saved, *, both: bool = Fals
     )
     body: Saved = {'format': kind, 'number': max([-1, *numbers.values()]) + 1, 'content': content}
     text = json.dumps({**body, 'sha256': _digest(body)}, indent=1, allow_nan=False)
-    for file in files if both else files[:1]:
-        replace_file(file, text)
-    return files[0]
+    first, second = files
+    if both:
+        # a busy disk takes seconds, in which a kill may come
+        replace_file(first, text, synced=False)
+        replace_file(second, text)
+        sync(first)
+    else:
+        replace_file(first, text)
+    return first
 
 
-def replace_file(file: Path, text: str) -> None:
+def replace_file(file: Path, text: str, *, synced: bool = True) -> None:
     """
     Put a file in place as a whole, and make sure that it is on the disk.
 
     :param file: path; its folder is made where it is missing.
     :param text: of the file.
+    :param synced: wait until it is on the disk; without, it outlives the process but no power cut.
     :raises OSError: where it cannot be written; what was there stays.
     """
     file.parent.mkdir(parents=True, exist_ok=True)
@@ -97,22 +105,25 @@ def replace_file(file: Path, text: str) -> None:
         with draft.open('w', encoding='utf-8') as stream:
             stream.write(text)
             stream.flush()
-            os.fsync(stream.fileno())
+            if synced:
+                os.fsync(stream.fileno())
         draft.replace(file)
     except OSError:
         draft.unlink(missing_ok=True)
         raise
-    sync_folder(file.parent)
+    if synced:
+        sync(file.parent, os.O_DIRECTORY)
 
 
-def sync_folder(folder: Path) -> None:
+def sync(path: Path, kind: int = 0) -> None:
     """
-    Make sure that the names of new files are on the disk.
+    Make sure that a file, or the names of new files in a folder, are on the disk.
 
-    :param folder: where they are.
+    :param path: of file or folder.
+    :param kind: os.O_DIRECTORY for a folder.
     :raises OSError: where that fails.
     """
-    number = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    number = os.open(path, os.O_RDONLY | kind)
     try:
         os.fsync(number)
     finally:

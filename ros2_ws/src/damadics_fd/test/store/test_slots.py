@@ -41,6 +41,38 @@ def test_both_slots_hold_the_newest_where_it_matters(tmp_path):
     assert sorted(p.name for p in tmp_path.iterdir()) == ['v.a.json', 'v.b.json']
 
 
+class Killed(BaseException):
+    """The process ends here."""
+
+
+@pytest.mark.parametrize('before', [None, {'n': 1}])
+def test_a_kill_while_the_disk_is_waited_for_loses_nothing(tmp_path, monkeypatch, before):
+    def killed(_):
+        raise Killed
+
+    path = tmp_path / 'v'
+    if before:
+        write_slot(path, KIND, before, both=True)
+    monkeypatch.setattr('os.fsync', killed)
+    with pytest.raises(Killed):
+        write_slot(path, KIND, {'n': 2}, both=True)
+    assert contents(path) == [{'n': 2}, before][: 2 if before else 1]
+    assert not problems(path)
+
+
+def test_what_is_kept_twice_is_synced_as_are_the_names(tmp_path, monkeypatch):
+    synced = []
+    sync = os.fsync
+
+    def noted(number):
+        synced.append(os.fstat(number).st_ino)
+        sync(number)
+
+    monkeypatch.setattr('os.fsync', noted)
+    write_slot(tmp_path / 'v', KIND, CONTENT, both=True)
+    assert set(synced) == {p.stat().st_ino for p in (tmp_path, *tmp_path.iterdir())}
+
+
 @settings(deadline=None)  # a busy machine pauses longer than one example may take
 @given(st.data())
 def test_any_damage_is_noticed(tmp_path_factory, data):
