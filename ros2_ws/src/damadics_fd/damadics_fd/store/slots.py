@@ -3,8 +3,9 @@
 """
 The one way files are written that have to survive: JSON in two slots, with a hash of its content.
 
-`NAME.a.json` and `NAME.b.json`. Each save replaces a slot as a whole and syncs file and folder, so
-that a power cut leaves the other; what does not fit its hash is not read. Nothing is unpickled.
+`NAME.a.json` and `NAME.b.json`. Each save replaces a slot as a whole, then syncs file and folder:
+a kill meanwhile leaves the new one, a power cut the other. What does not fit its hash is not read.
+Nothing is unpickled.
 """
 
 import contextlib
@@ -67,10 +68,9 @@ def write_slot(path: Path | str, kind: str, content: Saved, *, both: bool = Fals
     :param path: without slot and suffix; its folder is made where it is missing.
     :param kind: the format that the file names.
     :param content: what `read_slots` gives back; finite numbers only.
-    :param both: write the other slot too, so that damage of one of them loses nothing; the first
-        is in place before the disk is waited for, so that a kill in between loses nothing either.
+    :param both: write the other slot too, so that damage of one of them loses nothing.
     :return: the file written first.
-    :raises OSError: where it cannot be written; what was there stays.
+    :raises OSError: where it cannot be written; what `read_slots` gave stays.
     :raises ValueError: where a number is not finite.
     """
     numbers = {slot.file: slot.number for slot in read_slots(path, kind)}
@@ -79,55 +79,21 @@ def write_slot(path: Path | str, kind: str, content: Saved, *, both: bool = Fals
     )
     body: Saved = {'format': kind, 'number': max([-1, *numbers.values()]) + 1, 'content': content}
     text = json.dumps({**body, 'sha256': _digest(body)}, indent=1, allow_nan=False)
-    first, second = files
-    if both:
-        # a busy disk takes seconds, in which a kill may come
-        replace_file(first, text, synced=False)
-        replace_file(second, text)
-        sync(first)
-    else:
-        replace_file(first, text)
-    return first
+    for file in files if both else files[:1]:
+        _replace_slot(file, text)
+    return files[0]
 
 
-def replace_file(file: Path, text: str, *, synced: bool = True) -> None:
+def replace_file(file: Path, text: str) -> None:
     """
-    Put a file in place as a whole, and make sure that it is on the disk.
+    Put a file that has no other copy in place as a whole, once it is on the disk.
 
     :param file: path; its folder is made where it is missing.
     :param text: of the file.
-    :param synced: wait until it is on the disk; without, it outlives the process but no power cut.
     :raises OSError: where it cannot be written; what was there stays.
     """
-    file.parent.mkdir(parents=True, exist_ok=True)
-    draft = file.with_name(f'.{file.name}.{os.getpid()}.tmp')
-    try:
-        with draft.open('w', encoding='utf-8') as stream:
-            stream.write(text)
-            stream.flush()
-            if synced:
-                os.fsync(stream.fileno())
-        draft.replace(file)
-    except OSError:
-        draft.unlink(missing_ok=True)
-        raise
-    if synced:
-        sync(file.parent, os.O_DIRECTORY)
-
-
-def sync(path: Path, kind: int = 0) -> None:
-    """
-    Make sure that a file, or the names of new files in a folder, are on the disk.
-
-    :param path: of file or folder.
-    :param kind: os.O_DIRECTORY for a folder.
-    :raises OSError: where that fails.
-    """
-    number = os.open(path, os.O_RDONLY | kind)
-    try:
-        os.fsync(number)
-    finally:
-        os.close(number)
+    _put(file, text, first_on_disk=True)
+    _sync(file.parent)
 
 
 def set_aside(file: Path, keep: bool = False) -> Path:
@@ -212,6 +178,43 @@ def parse(data: bytes) -> Saved:
     if not isinstance(document, dict):
         raise ValueError('damaged: this is no JSON object')
     return document
+
+
+def _replace_slot(file: Path, text: str) -> None:
+    """Put a slot in place before the disk is waited for: a kill may come in the seconds it takes.
+
+    A power cut meanwhile leaves the other slot, as does a disk that refuses in the end.
+    """
+    _put(file, text, first_on_disk=False)
+    try:
+        _sync(file)
+        _sync(file.parent)
+    except OSError:
+        file.unlink(missing_ok=True)
+        raise
+
+
+def _put(file: Path, text: str, *, first_on_disk: bool) -> None:
+    """Write a draft and give it the name; where that fails, what was there stays."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    draft = file.with_name(f'.{file.name}.{os.getpid()}.tmp')
+    try:
+        draft.write_text(text, encoding='utf-8')
+        if first_on_disk:
+            _sync(draft)
+        draft.replace(file)
+    except OSError:
+        draft.unlink(missing_ok=True)
+        raise
+
+
+def _sync(path: Path) -> None:
+    """Wait until a file, or the names of the files in a folder, are on the disk."""
+    number = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(number)
+    finally:
+        os.close(number)
 
 
 def _linked(file: Path, name: Path) -> bool:

@@ -45,18 +45,19 @@ class Killed(BaseException):
     """The process ends here."""
 
 
-@pytest.mark.parametrize('before', [None, {'n': 1}])
-def test_a_kill_while_the_disk_is_waited_for_loses_nothing(tmp_path, monkeypatch, before):
+@pytest.mark.parametrize('both', [True, False])
+@pytest.mark.parametrize('before', [[], [{'n': 1}]])
+def test_a_kill_while_the_disk_is_waited_for_loses_nothing(tmp_path, monkeypatch, before, both):
     def killed(_):
         raise Killed
 
     path = tmp_path / 'v'
-    if before:
-        write_slot(path, KIND, before, both=True)
+    for content in before:
+        write_slot(path, KIND, content, both=True)
     monkeypatch.setattr('os.fsync', killed)
     with pytest.raises(Killed):
-        write_slot(path, KIND, {'n': 2}, both=True)
-    assert contents(path) == [{'n': 2}, before][: 2 if before else 1]
+        write_slot(path, KIND, {'n': 2}, both=both)
+    assert contents(path) == [{'n': 2}, *before]
     assert not problems(path)
 
 
