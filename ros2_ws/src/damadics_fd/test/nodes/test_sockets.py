@@ -29,7 +29,7 @@ def chosen() -> str | None:
     return os.environ.get(PROFILES)
 
 
-def test_sockets_where_a_process_of_the_domain_left_by_killed(killed):
+def test_sockets_where_a_process_of_the_domain_was_killed(killed):
     assert SOCKETS.exists()
     assert chosen() == str(SOCKETS)
 
