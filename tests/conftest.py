@@ -30,10 +30,10 @@ PYTEST = 'PYTEST_CURRENT_TEST'  # a page as a process takes it for a test of its
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark the tests of the page: they run beside those of the nodes and the connectors."""
+    """Mark the tests of the page and of OPC UA: they run beside those of the other nodes."""
     for item in items:
-        if item.path.parent.name == 'page':
-            item.add_marker(pytest.mark.page)
+        if (folder := item.path.parent.name) in ('page', 'opcua'):
+            item.add_marker(folder)
 
 
 class Peer:

@@ -61,6 +61,19 @@ def test_no_package_folder_holds_too_many_files():
     assert not full
 
 
+def test_the_page_on_architecture_names_every_room():
+    page = (ROOT / 'docs/architecture.md').read_text()
+    tables = re.findall(r'(?ms)^(\| room of `(\w+).*?)\n\n', page)
+    nameless = []
+    for path in {path.parent for path in tracked('ros2_ws/src/*.py')}:
+        package, *rooms = path.relative_to(ROOT / 'ros2_ws/src').parts
+        if rooms[:1] == [package] and rooms[1:]:
+            named = ''.join(table for table, of in tables if of == package)
+            if not re.search(rf'`([\w.]+/)*{rooms[-1]}/?`', named):
+                nameless.append(str(path.relative_to(ROOT)))
+    assert not nameless
+
+
 def test_no_file_names_a_place_of_one_machine_or_a_registry():
     words = r'(^|[^A-Za-z0-9_.])/(work|farm|root)/|index-url|"resolved": *"https?:'
     done = subprocess.run(

@@ -1,6 +1,7 @@
 #!/bin/bash
-# Run all tests in two streams side by side: those of running nodes and connectors, which wait most
-# of their time, and all others, first what starts nothing, at low priority, then the page.
+# Run all tests in two streams of about the same time side by side: those of running nodes and
+# connectors, which wait most of their time, and all others: first what starts nothing, at low
+# priority, then the page and OPC UA.
 # What is given is passed on to pytest.
 set -uo pipefail
 cd "$(dirname "$0")/.."
@@ -19,7 +20,7 @@ sys.exit(ending(lambda: int(pytest.main())))
 beside() {
   (renice -n 5 "$BASHPID" > /dev/null; stream others 'not slow and not ros' "$@")
   others=$?
-  stream page 'not slow and ros and page' "$@"
+  stream page 'not slow and ros and (page or opcua)' "$@"
   merged "$others" $?
 }
 
@@ -34,10 +35,10 @@ merged() {
 
 output=$(mktemp)
 trap 'kill "${beside:-}" 2> /dev/null; rm -f "$output"' EXIT
-echo 'Testing in two streams: nodes and connectors here, all others beside it (shown when done) ...'
+echo 'Testing in two streams: nodes and connectors here, the others beside it (shown when done) ...'
 beside "$@" > "$output" 2>&1 &
 beside=$!
-stream nodes 'not slow and ros and not page' "$@"
+stream nodes 'not slow and ros and not page and not opcua' "$@"
 nodes=$?
 wait "$beside"
 rest=$?

@@ -18,7 +18,7 @@ from damadics_msgs.msg import FaultEvent
 
 pytestmark = pytest.mark.ros
 OPERATOR, VIEWER = 'operator-0123456789abcdef', 'viewer-0123456789abcdef'
-FOREIGN = Path(__file__).parent / 'foreign'
+FOREIGN = Path(__file__).parents[1] / 'foreign'
 PADIM = 'http://opcfoundation.org/UA/PADIM/'
 DI = 'http://opcfoundation.org/UA/DI/'
 ALARM = ua.ObjectIds.AlarmConditionType
