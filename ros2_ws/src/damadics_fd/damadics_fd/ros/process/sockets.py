@@ -29,9 +29,17 @@ def over_sockets_after_a_kill() -> None:
     of profiles, stays.
     """
     domain = os.environ.get('ROS_DOMAIN_ID') or '0'
-    chosen = os.environ.get(PROFILES) or os.environ.get(TRANSPORTS) or Path(HERE).exists()
-    if not chosen and domain.isdecimal() and left_by_killed(int(domain)):
+    if not is_chosen() and domain.isdecimal() and left_by_killed(int(domain)):
         os.environ[PROFILES] = str(SOCKETS)
+
+
+def is_chosen() -> bool:
+    """
+    Tell whether the user has chosen how Fast DDS sends.
+
+    :return: true where the environment or a file of profiles says it.
+    """
+    return bool(os.environ.get(PROFILES) or os.environ.get(TRANSPORTS) or Path(HERE).exists())
 
 
 def left_by_killed(domain: int, memory: Path = MEMORY) -> list[Path]:
