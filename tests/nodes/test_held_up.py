@@ -2,12 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """How long a process of a demonstration may be held up before Fast DDS takes it for dead."""
 
+import os
 import struct
 from pathlib import Path
 
 import pytest
 from conftest import Peer
-from damadics_bringup.live_run import not_dead_when_held_up
+from damadics_bringup.live_run import PATIENT, LiveRun, not_dead_when_held_up
 from damadics_fd.ros import qos
 from damadics_fd.ros.process.sockets import HERE, PROFILES, TRANSPORTS
 from damadics_msgs.msg import FaultFlag
@@ -21,7 +22,7 @@ PORT = '/dev/shm/fastrtps_port'
 def in_a_folder_of_its_own(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for name in (PROFILES, TRANSPORTS):
-        monkeypatch.delenv(name, raising=False)
+        monkeypatch.setenv(name, '')  # as if it were not there, and put back after a run
 
 
 def held_up_for(number: int) -> list[int]:
@@ -46,6 +47,12 @@ def test_it_may_be_held_up_for_ten_seconds(domain, processes):
         assert TEN_SECONDS in held_up_for(processes.pid('detector'))
     finally:
         peer.close()
+
+
+def test_a_run_of_the_demo_is_allowed_it(domain, tmp_path):
+    run = LiveRun('paper_nominal', tmp_path / 'run', tmp_path / 'none', print, recorded=False)
+    run.close()
+    assert os.environ[PROFILES] == str(PATIENT)
 
 
 @pytest.mark.parametrize('name', [PROFILES, TRANSPORTS])
