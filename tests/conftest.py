@@ -17,6 +17,7 @@ import pytest
 import rclpy
 from damadics_bringup.processes import Processes, free_domain, surroundings
 from damadics_fd.ros import qos
+from damadics_fd.ros.process.sockets import listen_on_sockets
 from damadics_msgs.msg import Measurement
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.client import Client
@@ -27,6 +28,8 @@ from rclpy.qos import QoSProfile
 QUIET = 0.012  # s that the loop of `promised` takes on the machine that the times are promised on
 PATIENCE = 120.0  # s for what takes a second or two: a busy machine is no failure
 PYTEST = 'PYTEST_CURRENT_TEST'  # a page as a process takes it for a test of its own
+
+listen_on_sockets()  # a busy machine holds up this process, too
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

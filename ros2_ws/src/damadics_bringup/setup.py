@@ -11,7 +11,6 @@ setup(
     name=package,
     version=ElementTree.parse('package.xml').findtext('version'),
     packages=find_packages(exclude=['test']),
-    package_data={package: ['*.xml']},
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/' + package]),
         ('share/' + package, ['package.xml']),

@@ -11,7 +11,6 @@ from pathlib import Path
 import rclpy
 from damadics_fd.core.settings import Settings
 from damadics_fd.ros import qos
-from damadics_fd.ros.process.sockets import PROFILES, is_chosen
 from damadics_fd.store.references import load_reference
 from damadics_msgs.msg import FaultFlag
 from damadics_msgs.srv import Reference
@@ -42,21 +41,6 @@ QUIET = 1.0  # s from the detector's last word to the end of the processes
 AGAIN = 0.3  # s between two looks at how far the estimator has learned
 # Faster than real time, samples wait for their senders to be free: many then go in one packet.
 BUNDLED = {'RMW_FASTRTPS_PUBLICATION_MODE': 'ASYNCHRONOUS'}
-PATIENT = Path(__file__).with_name('patient.xml')
-
-
-def not_dead_when_held_up() -> dict[str, str]:
-    """
-    Return the environment in which a process may be held up for ten seconds.
-
-    A machine at its limit holds a process up now and then. Fast DDS takes one for dead that is a
-    second or two in the middle of a message, and then it may hear nothing any more, for ever: its
-    memory is made anew by whoever sends and by itself, and they need not agree. Not everywhere,
-    as nodes find each other later by a second or two.
-
-    :return: variables for every process of a run; none where the user has chosen, or a run before.
-    """
-    return {} if is_chosen() else {PROFILES: str(PATIENT)}
 
 
 class Watcher:
@@ -164,8 +148,7 @@ class LiveRun:
         self._reference = reference
         self._recorded = recorded
         domain = free_domain()
-        # the watcher lives in this process
-        os.environ.update(surroundings(domain) | not_dead_when_held_up())
+        os.environ.update(surroundings(domain))  # the watcher lives in this process
         self._watcher = Watcher(domain, on_time)
         self._processes = Processes(folder / 'logs', surroundings(domain))
         kept = {'reference': str(reference.resolve())}

@@ -11,7 +11,7 @@ from importlib import import_module
 from pathlib import Path
 
 from damadics_fd.leave import INTERRUPTED, ending
-from damadics_fd.ros.process.sockets import over_sockets_after_a_kill
+from damadics_fd.ros.process.sockets import listen_on_sockets
 
 # numba takes these in wherever they are installed, for what no kernel of ours calls: a tenth of a
 # node's start and 30 MB
@@ -28,7 +28,7 @@ def run(module: str) -> int:
         that the environment asks for is not installed.
     """
     one_thread()
-    over_sockets_after_a_kill()
+    listen_on_sockets()
     return ending(lambda: _main(module))
 
 
