@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Nodes listen on sockets: in shared memory they were, now and then, deaf for ever."""
 
+import signal
 import subprocess
 import sys
 from contextlib import suppress
@@ -12,6 +13,8 @@ from conftest import Peer
 from damadics_fd.ros import qos
 from damadics_fd.ros.process.sockets import PROFILES
 from damadics_msgs.msg import FaultFlag
+from rclpy.qos import QoSProfile
+from std_msgs.msg import Int32
 
 pytestmark = pytest.mark.ros
 READER = """
@@ -27,6 +30,31 @@ while not heard:
 print('heard', flush=True)
 input()
 """
+
+RECORDER = """
+import rclpy, time
+from damadics_fd.ros.process.sockets import listen_on_sockets
+from damadics_fd.ros.spin import spin_until
+from rclpy.experimental import EventsExecutor
+from rclpy.qos import QoSProfile
+from std_msgs.msg import Int32
+listen_on_sockets()
+rclpy.init()
+node = rclpy.create_node('recorder')
+executor = EventsExecutor()
+executor.add_node(node)
+heard = {'sample': [], 'flag': []}
+for topic, messages in heard.items():
+    node.create_subscription(Int32, topic, messages.append, QoSProfile(depth=2000))
+ending = []
+def done():
+    if not ending and any(flag.data < 0 for flag in heard['flag']):
+        ending.append(time.monotonic() + 2.0)  # the other topic may have its turn later
+    return ending and time.monotonic() > ending[0]
+spin_until(done, executor, [node])
+print({topic: len(messages) for topic, messages in heard.items()}, flush=True)
+"""
+FEW = int(Path('/proc/sys/net/core/rmem_max').read_text()) < 4_194_304
 
 
 def memory_of(number: int) -> list[str]:
@@ -67,3 +95,31 @@ def test_it_is_heard_by_who_listens_in_shared_memory(detector, monkeypatch):
             assert memory_of(reader.pid)
         finally:
             reader.kill()
+
+
+@pytest.mark.skipif(FEW, reason='the kernel lets less wait: sysctl net.core.rmem_max=4194304')
+def test_who_was_held_up_hears_every_flag_that_was_replaced_meanwhile(domain, monkeypatch):
+    """A recorder that the machine held up for a tenth of a second had not all edges of a flag."""
+    monkeypatch.delenv(PROFILES)
+    peer = Peer(domain, publishes=False)
+    samples = peer.node.create_publisher(Int32, 'sample', QoSProfile(depth=2000))
+    flags = peer.node.create_publisher(Int32, 'flag', QoSProfile(depth=1))
+    with subprocess.Popen(
+        [sys.executable, '-c', RECORDER], stdout=subprocess.PIPE, text=True
+    ) as recorder:
+        try:
+            assert peer.wait(lambda: samples.get_subscription_count())
+            assert peer.wait(lambda: flags.get_subscription_count())
+            peer.wait(lambda: False, 1.0)  # the recorder has met the publishers, too
+            recorder.send_signal(signal.SIGSTOP)
+            for n in range(1500):
+                samples.publish(Int32(data=n))
+                if n % 50 == 0:
+                    flags.publish(Int32(data=n))
+            recorder.send_signal(signal.SIGCONT)
+            peer.wait(lambda: False, 1.0)
+            flags.publish(Int32(data=-1))
+            assert recorder.stdout.readline() == "{'sample': 1500, 'flag': 31}\n"
+        finally:
+            recorder.kill()
+            peer.close()

@@ -21,6 +21,7 @@ from rclpy.task import Future
 
 from damadics_fd.core.text import SENTENCE, plain
 from damadics_fd.ros.process.clock_step import timers_kept_going
+from damadics_fd.ros.process.sockets import let_messages_wait
 
 WRONG = (NameValidationException, ParameterException)
 LOOK = 0.1  # s between two looks at whether to end
@@ -61,6 +62,7 @@ def spin_until(done: Callable[[], bool], executor: EventsExecutor, nodes: Sequen
     :param nodes: at least one.
     """
     steady = Clock(clock_type=ClockType.STEADY_TIME)
+    let_messages_wait()
     with timers_kept_going(nodes):
         while not done():
             ended: Future[None] = Future()

@@ -8,15 +8,23 @@ a second or two in the middle of a message is taken for dead, and its memory is 
 whoever sends and by itself. They need not agree: then the sender goes on writing into what is
 nobody's any more, and the listener hears nothing, for ever, however often it is started again
 (eProsima/Fast-DDS, pull request 4737). Who listens on sockets is sent to over sockets by all.
+
+Messages wait in the buffer of the socket while a process is held up. What finds no room is sent
+again, but for what its publisher keeps no longer, as all but the last word of a latched topic: so
+the buffer is as large as the kernel allows (`net.core.rmem_max`). A profile cannot say that where
+discovery is limited to LOCALHOST.
 """
 
+import contextlib
 import os
+import socket
 from pathlib import Path
 
 PROFILES = 'FASTRTPS_DEFAULT_PROFILES_FILE'
 TRANSPORTS = 'FASTDDS_BUILTIN_TRANSPORTS'
 HERE = 'DEFAULT_FASTRTPS_PROFILES.xml'  # read in the folder in which a process is started
 SOCKETS = Path(__file__).with_suffix('.xml')
+ROOM = 4_194_304  # bytes of messages that may wait: seconds of several valves
 
 
 def listen_on_sockets() -> None:
@@ -28,3 +36,22 @@ def listen_on_sockets() -> None:
     """
     if not (os.environ.get(PROFILES) or os.environ.get(TRANSPORTS) or Path(HERE).exists()):
         os.environ[PROFILES] = str(SOCKETS)
+
+
+def let_messages_wait() -> None:
+    """
+    Make room in the sockets on which this process listens.
+
+    To be called once its nodes are made.
+    """
+    for file in Path('/proc/self/fd').iterdir():
+        with contextlib.suppress(OSError):  # closed meanwhile, or not a socket
+            number = os.dup(int(file.name))
+            try:
+                copy = socket.socket(fileno=number)
+            except OSError:
+                os.close(number)
+                raise
+            with copy:
+                if (copy.family, copy.type) == (socket.AF_INET, socket.SOCK_DGRAM):
+                    copy.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, ROOM)
