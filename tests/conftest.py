@@ -17,7 +17,7 @@ import pytest
 import rclpy
 from damadics_bringup.processes import Processes, free_domain, surroundings
 from damadics_fd.ros import qos
-from damadics_fd.ros.process.sockets import listen_on_sockets
+from damadics_fd.ros.process.sockets import let_messages_wait, listen_on_sockets
 from damadics_msgs.msg import Measurement
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.client import Client
@@ -46,6 +46,7 @@ class Peer:
         self.context = Context()
         rclpy.init(context=self.context, domain_id=domain)
         self.node = rclpy.create_node('peer', context=self.context)
+        let_messages_wait()
         self.executor = EventsExecutor(context=self.context)
         self.executor.add_node(self.node)
         if publishes:

@@ -9,16 +9,16 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
-from conftest import Peer
+from conftest import Peer, promised
 from damadics_fd.ros import qos
-from damadics_fd.ros.process.sockets import PROFILES
+from damadics_fd.ros.process.sockets import PROFILES, ROOM
 from damadics_msgs.msg import FaultFlag
 from rclpy.qos import QoSProfile
 from std_msgs.msg import Int32
 
 pytestmark = pytest.mark.ros
 READER = """
-import os, rclpy
+import rclpy
 from damadics_fd.ros import qos
 from damadics_msgs.msg import FaultFlag
 rclpy.init()
@@ -30,7 +30,6 @@ while not heard:
 print('heard', flush=True)
 input()
 """
-
 RECORDER = """
 import rclpy, time
 from damadics_fd.ros.process.sockets import listen_on_sockets
@@ -54,7 +53,7 @@ def done():
 spin_until(done, executor, [node])
 print({topic: len(messages) for topic, messages in heard.items()}, flush=True)
 """
-FEW = int(Path('/proc/sys/net/core/rmem_max').read_text()) < 4_194_304
+LESS = int(Path('/proc/sys/net/core/rmem_max').read_text()) < ROOM
 
 
 def memory_of(number: int) -> list[str]:
@@ -97,7 +96,7 @@ def test_it_is_heard_by_who_listens_in_shared_memory(detector, monkeypatch):
             reader.kill()
 
 
-@pytest.mark.skipif(FEW, reason='the kernel lets less wait: sysctl net.core.rmem_max=4194304')
+@pytest.mark.skipif(LESS, reason='the kernel lets less wait: sysctl net.core.rmem_max=4194304')
 def test_who_was_held_up_hears_every_flag_that_was_replaced_meanwhile(domain, monkeypatch):
     """A recorder that the machine held up for a tenth of a second had not all edges of a flag."""
     monkeypatch.delenv(PROFILES)
@@ -110,7 +109,7 @@ def test_who_was_held_up_hears_every_flag_that_was_replaced_meanwhile(domain, mo
         try:
             assert peer.wait(lambda: samples.get_subscription_count())
             assert peer.wait(lambda: flags.get_subscription_count())
-            peer.wait(lambda: False, 1.0)  # the recorder has met the publishers, too
+            peer.wait(lambda: False, promised(1.0))  # the recorder has met the publishers, too
             recorder.send_signal(signal.SIGSTOP)
             for n in range(1500):
                 samples.publish(Int32(data=n))

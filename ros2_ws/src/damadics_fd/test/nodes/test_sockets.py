@@ -1,16 +1,19 @@
 # Copyright 2026 DAMADICS FD maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Nodes listen on sockets, unless the user has chosen."""
+"""Nodes listen on sockets, unless the user has chosen, and messages may wait there."""
 
 import os
+import socket
 from pathlib import Path
 
 import pytest
+from damadics_fd.ros.process import sockets
 from damadics_fd.ros.process.sockets import (
     HERE,
     PROFILES,
     SOCKETS,
     TRANSPORTS,
+    let_messages_wait,
     listen_on_sockets,
 )
 
@@ -39,3 +42,24 @@ def test_a_file_of_profiles_in_the_folder_is_the_users():
     Path(HERE).touch()
     listen_on_sockets()
     assert os.environ[PROFILES] == ''
+
+
+def room(listening: socket.socket) -> int:
+    return listening.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF)
+
+
+def test_messages_have_more_room_than_as_a_rule():
+    with socket.socket(type=socket.SOCK_DGRAM) as listening:
+        listening.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 10_000)
+        before, opened = room(listening), len(list(Path('/proc/self/fd').iterdir()))
+        let_messages_wait()
+        assert room(listening) > before
+        assert len(list(Path('/proc/self/fd').iterdir())) == opened
+
+
+def test_a_socket_that_has_more_room_keeps_it(monkeypatch):
+    monkeypatch.setattr(sockets, 'ROOM', 10_000)
+    with socket.socket(type=socket.SOCK_DGRAM) as listening:
+        before = room(listening)
+        let_messages_wait()
+        assert room(listening) == before

@@ -42,9 +42,9 @@ def let_messages_wait() -> None:
     """
     Make room in the sockets on which this process listens.
 
-    To be called once its nodes are made.
+    To be called once its nodes are made. A socket that has more room keeps it.
     """
-    for file in Path('/proc/self/fd').iterdir():
+    for file in Path('/proc/self/fd').glob('*'):
         with contextlib.suppress(OSError):  # closed meanwhile, or not a socket
             number = os.dup(int(file.name))
             try:
@@ -54,4 +54,11 @@ def let_messages_wait() -> None:
                 raise
             with copy:
                 if (copy.family, copy.type) == (socket.AF_INET, socket.SOCK_DGRAM):
-                    copy.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, ROOM)
+                    _make_room(copy)
+
+
+def _make_room(listening: socket.socket) -> None:
+    """Have a socket hold `ROOM` bytes, where it holds less; the kernel counts them twice."""
+    size = (socket.SOL_SOCKET, socket.SO_RCVBUF)
+    if listening.getsockopt(*size) < 2 * ROOM:
+        listening.setsockopt(*size, ROOM)
