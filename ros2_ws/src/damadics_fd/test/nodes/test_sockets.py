@@ -2,8 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Nodes listen on sockets, unless the user has chosen, and messages may wait there."""
 
+import fcntl
 import os
 import socket
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -63,3 +66,14 @@ def test_a_socket_that_has_more_room_keeps_it(monkeypatch):
         before = room(listening)
         let_messages_wait()
         assert room(listening) == before
+
+
+def test_a_locked_file_stays_locked(tmp_path):
+    """A closed copy of its descriptor took the lock of a database away: two wrote into one."""
+    file = tmp_path / 'locked'
+    other = f"import fcntl; fcntl.lockf(open({str(file)!r}, 'a'), fcntl.LOCK_EX | fcntl.LOCK_NB)"
+    with file.open('a') as locked:
+        fcntl.lockf(locked, fcntl.LOCK_EX)
+        let_messages_wait()
+        tried = subprocess.run([sys.executable, '-c', other], capture_output=True, text=True)
+        assert 'BlockingIOError' in tried.stderr

@@ -46,15 +46,13 @@ def let_messages_wait() -> None:
     """
     for file in Path('/proc/self/fd').glob('*'):
         with contextlib.suppress(OSError):  # closed meanwhile, or not a socket
-            number = os.dup(int(file.name))
+            # Never a copy of the descriptor: to close one takes away the locks of this process.
+            own = socket.socket(fileno=int(file.name))
             try:
-                copy = socket.socket(fileno=number)
-            except OSError:
-                os.close(number)
-                raise
-            with copy:
-                if (copy.family, copy.type) == (socket.AF_INET, socket.SOCK_DGRAM):
-                    _make_room(copy)
+                if (own.family, own.type) == (socket.AF_INET, socket.SOCK_DGRAM):
+                    _make_room(own)
+            finally:
+                own.detach()
 
 
 def _make_room(listening: socket.socket) -> None:
